@@ -59,7 +59,7 @@ from reports.vehicle_groups import Group, VehicleReport
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Counted since the start; those of the flight controller since it was found, None without MSP."""
+    """Counted since the start. Those of the flight controller since it was found, None without MSP."""
 
     ground_stations: int
     #: Frames of ground stations: damaged ones, and refused ones, by link and reason.
@@ -86,7 +86,7 @@ class TimedPart(Protocol):
 
 
 class Bridge:
-    """The whole bridge. Its public methods are all that service/ uses; the parts behind them are private.
+    """The whole bridge. Its public methods are all that service/ uses. The parts behind them are private.
 
     After each input, carry out the effects, and call `tick` at `due`:
 
@@ -111,7 +111,7 @@ class Bridge:
         #: The armed craft as last remembered; it changes rarely.
         self._flight = config.flight
         self._was_armed = False
-        #: True while an autopilot speaks MAVLink itself: the bridge then sends nothing in its name.
+        #: True while an autopilot speaks MAVLink itself: the bridge then does not send anything in its name.
         self.is_passing_through = False
 
         owner, emit, incidents = config.settings, self._effects.append, count(1)
@@ -214,7 +214,7 @@ class Bridge:
         self._session.closed(now, why)
 
     def fc_received(self, data: bytes, now: float) -> bool:
-        """Handle bytes from the port; False if they ended inside a frame and nothing else has changed."""
+        """Handle bytes from the port. Returns False if they ended inside a frame and nothing else has changed."""
         self._has_line_changed = True
         event = self._session.state.receive(data, now)
         if event is not None:
@@ -226,7 +226,7 @@ class Bridge:
 
     @property
     def fc_trouble(self) -> str:
-        """The reason why the board cannot be used, and the remedy; empty if it can be."""
+        """The reason why the board cannot be used, and the remedy, or empty if it can be."""
         trouble = self._session.state.trouble
         return "" if trouble is None else trouble.text
 
@@ -238,7 +238,7 @@ class Bridge:
     # The ground stations' side.
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
-        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
+        """Handle bytes from a ground station. Returns False if they are dropped. A datagram holds whole frames only."""
         return self._incoming.received(peer, data, now, datagram=datagram)
 
     def gcs_gone(self, peer: Peer, now: float) -> None:
@@ -246,7 +246,7 @@ class Bridge:
         self._ground.gone(peer)
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
+        """Send to `peer` before it is heard. `until_answered`: only while no peer is heard on the link (broadcast)."""
         self._ground.add_default_peer(peer, until_answered=until_answered)
 
     def remove_default_peer(self, peer: Peer) -> None:
@@ -302,7 +302,7 @@ class Bridge:
         return self._reporter.whole(now)
 
     def group(self, group: Group, now: float) -> Any:
-        """The current values of a group: an instance of its class in reports.vehicle_groups."""
+        """The current values of a group: an instance of the class in reports.vehicle_groups."""
         return self._reporter.group(group, now)
 
     def counters(self) -> Counters:
@@ -363,12 +363,12 @@ class Bridge:
         missions = profile.missions
         store = missions if isinstance(missions, Refusal) else missions(controller, self.vehicle, rules)
         stores = store, profile.fences(controller, self.vehicle), profile.rally(controller, self.vehicle)
-        # On a port that was opened since, an armed board may be another one.
+        # On a port that was opened since, an armed board may be another.
         self._types.use(stores, now, is_same_board=self._session.met_family == profile.family)
         self._readiness.found(controller, now)
         self._calibration.controller_found(now)
         if not isinstance(store, Refusal):
-            # Read its list at once: MISSION_CURRENT reports the count, and the first Read needs no wait.
+            # Read the list at once: MISSION_CURRENT reports the count, and the first Read does not need a wait.
             self._watch.due = now
 
     def _follow_line(self, now: float) -> None:

@@ -25,7 +25,7 @@ class PassThroughRule(Enum):
 class BridgeSettings:
     """The owner's settings of the bridge.
 
-    A field is all that a setting needs: service/settings/table.py derives its key, reader and documentation from it.
+    A field is all that a setting needs: service/settings/table.py derives the key, reader and documentation from it.
     """
 
     sysid: Annotated[int, range(1, 256), "MAVLink system id of the vehicle, 1..255."] = 1

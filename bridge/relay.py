@@ -2,7 +2,7 @@
 """The ground station's end of a slow link to a vehicle: missions are received and read here, and cross it as a whole.
 
 A mission over MAVLink takes a round trip for each item. So the receiver of the bridge itself (bridge/transfers) runs
-next to the ground station, the whole list goes to the vehicle as one command, and the final ack waits for its result.
+next to the ground station, the whole list goes to the vehicle as one command, and the final ack waits for the result.
 Everything else is passed on, with new sequence numbers: stations show gaps as a bad link. Sans-IO.
 """
 
@@ -113,7 +113,7 @@ class Relay:
 
     @property
     def system(self) -> int | None:
-        """The vehicle's system id; None before it was heard."""
+        """The vehicle's system id, or None before it was heard."""
         return None if self._end is None else self._end.ids[0]
 
     @property
@@ -143,7 +143,7 @@ class Relay:
         return effects
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Handle bytes from a ground station; before the vehicle was heard they are passed on."""
+        """Handle bytes from a ground station. Before the vehicle was heard they are passed on."""
         if self._end is None:
             self._effects.append(SendToVehicle(data))
         else:
@@ -165,7 +165,7 @@ class Relay:
             self._end.vehicle_sent(frame, now)
 
     def holds(self, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
-        """The vehicle's mission has changed; None: it is not known."""
+        """The vehicle's mission has changed, or None if it is not known."""
         self._held = items, identity
         if self._end is not None:
             self._end.holds(items, identity)
@@ -177,7 +177,7 @@ class Relay:
 
 
 class _End:
-    """The vehicle's end of MAVLink's mission protocol, under its ids."""
+    """The vehicle's end of MAVLink's mission protocol, under the ids."""
 
     def __init__(self, ids: tuple[int, int], effects: list[RelayEffect], is_near: Callable[[str], bool]) -> None:
         self.ids = ids

@@ -14,7 +14,7 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
 @dataclass(frozen=True, slots=True)
 class SameSystem:
-    """An effect: a vehicle is left out, because another one has its system id."""
+    """An effect: a vehicle is left out, because another has the system id."""
 
     other: str
     system: int

@@ -2,9 +2,9 @@
 """Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64 armhf` in the project's folder.
 
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
-side; pip fetches them for any architecture on any machine, and nothing is compiled. The target needs no network.
+side; pip fetches them for any architecture on any machine, and nothing is compiled. The target does not need a network.
 
-cbor2 has no wheel for armhf: its last pure Python release is used there (armhf.lock). pymavlink has none either.
+cbor2 has no wheel for armhf: the last pure Python release is used there (armhf.lock). pymavlink has none either.
 Only the modules that we use are packed: the rest is a module in C and 90 MB of other dialects and log tools.
 
 pip evaluates a requirement's `python_version < ...` for the Python that runs it, not for the target's. So far our
@@ -41,7 +41,7 @@ _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux20
 
 
 def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST, compression: str = "xz") -> Path:
-    """Build the package in `folder`; returns its path. `compression` is dpkg-deb's."""
+    """Build the package in `folder`; returns the path. `compression` is dpkg-deb's."""
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
@@ -98,7 +98,7 @@ def _download(lock: Path, folder: Path, *target: str) -> None:
 
 
 def _fetch_pymavlink(wheels: Path) -> None:
-    """Put a wheel with the used modules of pymavlink into the folder `wheels`; it suits every Python and machine."""
+    """Put a wheel with the used modules of pymavlink into the folder `wheels`. It suits every Python and machine."""
     with tempfile.TemporaryDirectory() as name:
         lock = Path(name) / "pymavlink.lock"
         lock.write_text(next(text for text, package, _ in _pinned() if package == "pymavlink"))
@@ -149,7 +149,7 @@ def _run(*command: str | Path) -> None:
 def _commit_time() -> str:
     command = ("git", "-C", str(_PROJECT), "log", "-1", "--format=%ct")
     asked = subprocess.run(command, check=False, capture_output=True, text=True)
-    # A source archive has the commit's time on its files.
+    # A source archive has the commit's time on the files.
     return asked.stdout.strip() or str(int((_PROJECT / "pyproject.toml").stat().st_mtime))
 
 

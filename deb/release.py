@@ -27,7 +27,7 @@ SUMS, NOTES = "SHA256SUMS", "NOTES.md"
 
 
 def release(version: str, architectures: tuple[str, ...] = _ARCHITECTURES) -> Path:
-    """Make the release; returns the folder of its files."""
+    """Make the release. Returns the folder of the files."""
     newest = released_versions(_CHANGELOG.read_text())[0]
     if not _VERSION.fullmatch(version):
         raise ReleaseError(f"{version!r} is not a version: write three numbers, as in 0.3.0")

@@ -22,7 +22,7 @@ class ReleaseError(Exception):
 
 
 def sign(file: Path, namespace: str = NAMESPACE) -> Path:
-    """Sign a file with git's user.signingkey, an SSH key; returns the signature's file, next to it."""
+    """Sign a file with git's user.signingkey, an SSH key. Returns the signature's file, next to it."""
     key = _git_setting("user.signingkey")
     if not key or _git_setting("gpg.format") != "ssh":
         raise ReleaseError("there is no SSH key to sign with (CONTRIBUTING.md, A release)")
@@ -43,7 +43,7 @@ def sign_package(package: Path) -> None:
 
 
 def check_key() -> None:
-    """Make sure that a Pi will accept what is signed here; ReleaseError if not."""
+    """Make sure that a Pi will accept what is signed here. Raises ReleaseError if not."""
     with TemporaryDirectory() as folder:
         probe = Path(folder, "probe")
         probe.write_bytes(b"")

@@ -105,7 +105,7 @@ def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
 def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **where: Any) -> None:
     """Read the missions of vehicles' flight controllers: of all that are alive, or of those named.
 
-    PATH is a folder, in which each vehicle's mission becomes NAME.waypoints; for one named vehicle it may be a file, or
+    PATH is a folder, in which each vehicle's mission becomes NAME.waypoints. For one named vehicle it may be a file, or
     - for standard output. Without it the missions are shown. Exit code 1: one was not read, or cannot be written.
     """
     to_output = path == _STANDARD_OUTPUT

@@ -38,7 +38,7 @@ _folder_option = click.option(
 def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None:
     """Add a vehicle or a person to a fleet: makes the login and the router's access control.
 
-    Restart the router afterwards: it reads both only at its start. A name enrolled again keeps its login.
+    Restart the router afterwards: it reads both only at the start. A name enrolled again keeps the login.
     """
     fleet, way_in = FleetFolder(folder.absolute()), FleetRouter(router, prefix)
     try:
@@ -65,7 +65,7 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
 def expel(name: str, folder: Path) -> None:
     """Remove a vehicle or a person from a fleet: the rights, and the password if it has one.
 
-    Restart the router afterwards: until then its present sessions and its login still work. A certificate stays valid,
+    Restart the router afterwards: until then the present sessions and the login still work. A certificate stays valid,
     but without rights, so the name of a member with a certificate cannot be enrolled again.
     """
     fleet = FleetFolder(folder.absolute())

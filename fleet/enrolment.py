@@ -58,7 +58,7 @@ class EnrolmentError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """`sysid`: a vehicle's MAVLink system id, which no other vehicle of the fleet has; else None."""
+    """`sysid`: a vehicle's MAVLink system id, which no other vehicle of the fleet has, else None."""
 
     role: Role
     sysid: int | None = None
@@ -81,7 +81,7 @@ class FleetRouter:
 
     @property
     def is_tls(self) -> bool:
-        """True if members have certificates; else each has a password."""
+        """True if members have certificates, else each has a password."""
         return self.endpoint.startswith(("tls/", "quic/"))
 
 
@@ -176,7 +176,7 @@ class FleetFolder:
         return session | {"transport": {"auth": {"usrpwd": {"user": name, "password": self._password(name)}}}}
 
     def _password(self, name: str) -> str:
-        """The member's password; a new member gets a new one."""
+        """The member's password. A new member gets a new one."""
         known = self._passwords()
         if name not in known:
             known[name] = secrets.token_urlsafe(18)
@@ -202,7 +202,7 @@ class FleetFolder:
         return path
 
     def _read(self, name: str) -> str:
-        """A file's text; empty if there is none yet."""
+        """A file's text, or empty if there is none yet."""
         path = self.path / name
         try:
             return read_bounded(path, _MAX_BYTES).decode()
@@ -234,7 +234,7 @@ def _with_sysids(members: Mapping[str, Member]) -> dict[str, Member]:
 
 
 def _check_member(name: str) -> None:
-    """ZenohSettingsError, or EnrolmentError for a name that is fit for a vehicle, but not for its files and login."""
+    """ZenohSettingsError, or EnrolmentError for a name that is fit for a vehicle, but not for the files and login."""
     check_name("the name", name)
     if name.lower() in _RESERVED:
         raise EnrolmentError(f"{name!r} is the name of the fleet's own files: choose another name")
@@ -243,14 +243,14 @@ def _check_member(name: str) -> None:
 
 
 def access_control(prefix: str, members: Mapping[str, Role], *, by_certificate: bool) -> Json:
-    """Zenoh's access control; everything not listed is denied."""
+    """Zenoh's access control. Everything not listed is denied."""
     everything = [
         f"{prefix}/{each}" if each[0] == "*" and each[1] == "*" else f"{prefix}/*/{each}" for each in _EXPRESSIONS
     ]
     viewed = [f"{prefix}/{each}" for each in _VIEWED]
     rules = [
         _rule("everything", ["ingress", "egress"], [*_LISTEN, *_SPEAK], everything),
-        # A guest sends only queries; the router passes on only replies to it.
+        # A guest sends only queries. The router passes on only replies to it.
         _rule("ask", ["ingress"], _LISTEN, viewed),
         _rule("be answered", ["egress"], [*_LISTEN, *_SPEAK], viewed),
         _rule("be asked", ["egress"], ["put", "delete", *_LISTEN], everything),

@@ -60,7 +60,7 @@ def fetch_log(
 ) -> None:
     """Fetch a log into `path`, at most `rate_b_s` bytes a second over the link; FleetError, OSError.
 
-    Until it is whole it is called NAME.part; a fetch continues at the end of that file. `show` gets its size.
+    Until it is whole it is called NAME.part. A fetch continues at the end of that file. `show` gets the size.
     """
     partial = path.with_name(f"{path.name}.part")
     with partial.open("ab") as file:
@@ -84,7 +84,7 @@ def _again(session: zenoh.Session, prefix: str, vehicle: str, request: bytes) ->
 
 
 def _piece(result: Json, start: int) -> tuple[bytes, int]:
-    """The piece of a log, and its size on the link."""
+    """The piece of a log, and the size on the link."""
     data = text(result, "data") or ""
     try:
         piece = zlib.decompressobj().decompress(base64.b64decode(data, validate=True), _MOST_BYTES)

@@ -21,7 +21,7 @@ _TIMEOUT_S = 15.0
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """One vehicle's mission; `error`: why it is not known, with the rest empty."""
+    """One vehicle's mission. `error`: why it is not known, with the rest empty."""
 
     vehicle: str
     items: tuple[MissionItem, ...] = ()
@@ -31,7 +31,7 @@ class Held:
 
 
 def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeId]) -> list[Held]:
-    """Read the missions; one result per vehicle, in the order of `names`. Replies of storages are ignored."""
+    """Read the missions. One result per vehicle, in the order of `names`. Replies of storages are ignored."""
     meant = [bridge for bridge in bridges if bridge.vehicle in names]
     used = Counter(bridge.vehicle for bridge in meant)
     # One query to all takes no longer than one to the slowest.
@@ -61,7 +61,7 @@ def _held(name: str, data: Json | None) -> Held:
 class Trial:
     """One vehicle's reply. `count`, `checksum`: of the records that the mission would become there.
 
-    `held_count`, `held`: count and checksum of its present mission. `error`: why there is no verdict, or a rejection.
+    `held_count`, `held`: count and checksum of the present mission. `error`: why there is no verdict, or a rejection.
     """
 
     vehicle: str
@@ -75,19 +75,19 @@ class Trial:
 
     @property
     def is_held(self) -> bool | None:
-        """True if the vehicle holds the mission, by its checksum; None if it gave no verdict."""
+        """True if the vehicle holds the mission, by the checksum, or None if it gave no verdict."""
         return None if self.checksum is None else self.error is None and self.checksum == self.held
 
     @property
     def is_accepted(self) -> bool | None:
-        """True if the vehicle would accept the mission; None if it gave no verdict."""
+        """True if the vehicle would accept the mission, or None if it gave no verdict."""
         return None if self.checksum is None else self.error is None
 
 
 def try_mission(
     session: zenoh.Session, prefix: str, names: Collection[str], bridges: Collection[BridgeId], mission: bytes
 ) -> list[Trial]:
-    """Have each vehicle check the mission and send the checksum of its current one."""
+    """Have each vehicle check the mission and send the checksum of the current one."""
     trials = {name: Trial(name) for name in names}
     for name, reply in ask_each(session, prefix, names, CHECK.suffix, _TIMEOUT_S, mission):
         if reply is not None:

@@ -23,7 +23,7 @@ _TOO_LATE = f"no result after {_PUSH_TIMEOUT_S:.0f} s; {_LOOK}"
 
 @dataclass(slots=True)
 class PushState:
-    """The progress of one vehicle. `records` of `total` are written; `error`: why it failed, or was left out."""
+    """The progress of one vehicle. `records` of `total` are written. `error`: why it failed, or was left out."""
 
     vehicle: str
     records: int = 0
@@ -60,11 +60,11 @@ class FleetPush:
 
     @property
     def left_out(self) -> list[PushState]:
-        """The vehicles that nothing was sent to, because another one had failed."""
+        """The vehicles that nothing was sent to, because another had failed."""
         return [each for each in self.vehicles.values() if each.is_left_out]
 
     def begin(self, names: Iterable[str], *, staged: bool) -> Iterator[str]:
-        """Yield each vehicle whose push begins now; with `staged` no further one after a failure."""
+        """Yield each vehicle whose push begins now. With `staged` no further one after a failure."""
         for name in names:
             if staged and (failed := self.failed):
                 for other in set(self.waiting) - set(self.running):
@@ -96,7 +96,7 @@ class FleetPush:
             progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"
 
     def held(self, vehicle: str, text: str) -> None:
-        """Take a vehicle that needs no push, because it holds the mission already."""
+        """Take a vehicle that does not need a push, because it holds the mission already."""
         self.vehicles[vehicle].result = {"ack": ACCEPTED, "text": text}
 
     def ended(self, vehicle: str) -> None:

@@ -40,7 +40,7 @@ from terminal.sentences import INTERRUPTED, UNREADABLE, complain, fail
 
 @dataclass(frozen=True, slots=True)
 class Pushed:
-    """A kind of push: its key, the table's heading, the end of the summary, and the sentence after Ctrl-C."""
+    """A kind of push: the key, the table's heading, the end of the summary, and the sentence after Ctrl-C."""
 
     key: ZenohKey
     heading: str
@@ -145,7 +145,7 @@ def push_file(
     staged: bool,
     as_json: bool,
 ) -> bool:
-    """Push a file with `count` parts and print the outcome; True if a vehicle failed."""
+    """Push a file with `count` parts and print the outcome. Returns True if a vehicle failed."""
     is_stopped = False
     try:
         with push_bars(count) as show:

@@ -24,7 +24,7 @@ _PAUSES = 15
 
 
 def alive(session: zenoh.Session, prefix: str, *more: zenoh.Session) -> set[BridgeId]:
-    """The bridges that have a liveliness token; FleetError if the router does not list all.
+    """The bridges that have a liveliness token. Raises FleetError if the router does not list all.
 
     `more`: sessions to share a large fleet with. zenoh compares each token that a session lists with all before, so
     one alone takes 4 s for 10,000 vehicles.
@@ -83,7 +83,7 @@ def replies_of(
 
 
 def chosen(bridges: set[BridgeId], names: tuple[str, ...], prefix: str) -> list[str]:
-    """The names to use: the given ones, or all; FleetError if one is not alive."""
+    """The names to use: the given ones, or all. Raises FleetError if one is not alive."""
     there = sorted({bridge.vehicle for bridge in bridges}, key=in_order)
     if not there:
         raise FleetError(f"no vehicle is alive under {prefix!r}: is naze-bridge running there, with this prefix?")

@@ -30,7 +30,7 @@ class FleetError(Exception):
 
 
 def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -> zenoh.Session:
-    """Open the session; FleetError if that fails. Of several endpoints the first to answer is used.
+    """Open the session. Raises FleetError if that fails. Of several endpoints the first to answer is used.
 
     `config_file`: a zenoh configuration to start from, for TLS, passwords and the like.
     """

@@ -34,7 +34,7 @@ _TIMEOUT_S = 40.0
 
 @dataclass(slots=True)
 class HeldSettings:
-    """One vehicle's settings. board: the firmware and its version. error: why they are not known."""
+    """One vehicle's settings. board: the firmware and the version. error: why they are not known."""
 
     vehicle: str
     board: str = ""
@@ -52,7 +52,7 @@ class SettingVariant:
 
 @dataclass(slots=True)
 class SettingsTrial:
-    """The plan of a restore on one vehicle; `plan`: of SettingsApi.plan, None with an error."""
+    """The plan of a restore on one vehicle. `plan`: of SettingsApi.plan, None with an error."""
 
     vehicle: str
     plan: Json | None = None

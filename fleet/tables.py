@@ -41,7 +41,7 @@ def _table(*titles: str, caption: Text | None = None) -> Table:
 
 
 def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
-    """One row per bridge, each on one line of 80 columns: vehicle, age of its state, problem."""
+    """One row per bridge, each on one line of 80 columns: vehicle, age of the state, problem."""
     table = _table("Vehicle", "Armed", "Battery", "Height", "Mission", "Heard", "Problem, or mode")
     for column in (table.columns[0], table.columns[-1]):
         column.no_wrap, column.overflow, column.max_width = True, "ellipsis", 20
@@ -163,7 +163,7 @@ def dry_run_table(trials: Sequence[Trial]) -> Table:
 
 
 def verify_table(trials: Sequence[Trial]) -> Table:
-    """One row per vehicle: the mission that it holds, and if that is another one, how it would hold the file."""
+    """One row per vehicle: the mission that it holds, and if that is another, how it would hold the file."""
     table = _table("Vehicle", "Records", "Checksum", "Holds it", "Details")
     for trial in trials:
         wanted = f"the file would be {trial.count} records, {trial.checksum}"

@@ -49,7 +49,7 @@ class FleetVehicle:
 
 
 def bridge_of(key: str, prefix: str) -> BridgeId | None:
-    """The bridge that a liveliness token's key belongs to; None for other keys."""
+    """The bridge that a liveliness token's key belongs to, or None for other keys."""
     match key.split("/"):
         case [first, name, *middle, session_id] if first == prefix and "/".join(middle) == ALIVE:
             try:

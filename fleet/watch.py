@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet as it changes: the vehicles that are alive, and the newest values of each.
 
-All send their overview, 14 B/s; only the vehicles on the screen also send their state, 1,400 B/s. Liveliness tokens
+All send their overview, 14 B/s. Only the vehicles on the screen also send their state, 1,400 B/s. Liveliness tokens
 have a session of their own: a zenoh session compares each arriving sample with every token that it knows, which takes
 a whole core for a thousand samples a second with ten thousand tokens.
 """
@@ -49,14 +49,14 @@ class Watch:
         self._bridges: dict[str, set[str]] = {}
         #: By name: the newest values, and when they arrived.
         self._heard: dict[str, tuple[FleetVehicle, float]] = {}
-        #: The names in order; empty after a change.
+        #: The names in order, or empty after a change.
         self._names: list[str] = []
         self._followed: dict[str, zenoh.Subscriber[None]] = {}
-        #: True if the router has listed all vehicles; `_is_incomplete`: its list ends early.
+        #: True if the router has listed all vehicles. `_is_incomplete`: the list ends early.
         self.is_listed = self._is_incomplete = False
 
     def later(self, take: Callable[[Any], None], *, has_end: bool = False) -> "zenoh.handlers.Callback[Any]":
-        """Have the next `look` call `take` with what arrives; `has_end`: in the end with None."""
+        """Have the next `look` call `take` with what arrives. `has_end`: in the end with None."""
 
         def arrived(what: Any) -> None:
             self._arrived.append((take, what))
@@ -78,7 +78,7 @@ class Watch:
         self._roll.liveliness().get(full(self._prefix, "*", f"{ALIVE}/*"), take, timeout=_LIST_TIMEOUT_S)
 
     def listed(self, reply: zenoh.Reply | None) -> None:
-        """Take a token of the router's list; None: the list has ended."""
+        """Take a token of the router's list. Returns None if the list has ended."""
         if reply is None:
             # Now, because replies count only from bridges that are known to be alive.
             self.is_listed = not self._is_incomplete

@@ -39,7 +39,7 @@ _PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
 
 @dataclass(frozen=True, slots=True)
 class ScreenRow:
-    """A vehicle on the screen; `age_s`: of its newest state, None if there is none."""
+    """A vehicle on the screen. `age_s`: of the newest state, None if there is none."""
 
     vehicle: FleetVehicle
     age_s: float | None
@@ -50,7 +50,7 @@ class ScreenRow:
 
     @property
     def problem(self) -> str:
-        """The reason why it needs attention; empty if it does not, or if nothing was heard of it."""
+        """The reason why it needs attention, or empty if it does not, or if nothing was heard of it."""
         if self.vehicle.bridges > 1:
             return f"{self.vehicle.bridges} bridges use this name"
         if not self.is_heard:
@@ -126,7 +126,7 @@ def _rows(seen: Watch, conditions: Sequence[Condition]) -> list[ScreenRow]:
 
 
 class _Rank(IntEnum):
-    """The order of the rows; those of one rank are ordered by name."""
+    """The order of the rows. Those of one rank are ordered by name."""
 
     ARMED = 0
     PROBLEM = 1
@@ -157,7 +157,7 @@ def _scrolling() -> Iterator[None]:
 
 
 def _wait_for_scroll(timeout_s: float, page: int) -> int:
-    """Wait for a key; the rows to scroll, 0 for none."""
+    """Wait for a key. The rows to scroll, 0 for none."""
     if not sys.stdin.isatty():
         select.select([], [], [], timeout_s)
         return 0

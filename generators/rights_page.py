@@ -42,7 +42,7 @@ def _names(firmware: Collection[Firmware]) -> str:
 
 
 def _requests(texts: Mapping[int, str]) -> str:
-    """The requests by name; a sensor's values, which have none, by their range."""
+    """The requests by name. A sensor's values, which have none, by their range."""
     sensors = [command for command, text in texts.items() if text == _SENSOR]
     named = [text for text in texts.values() if text != _SENSOR]
     return ", ".join([*named, *([f"{_SENSOR} (0x{min(sensors):04X}..0x{max(sensors):04X})"] if sensors else [])])

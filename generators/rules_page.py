@@ -23,7 +23,7 @@ _PLACES = {
 
 
 def table() -> str:
-    """The table for a board with its default settings."""
+    """The table for a board with the default settings."""
     rows = ["| command | param1 | Hit Rad, m | param4 | Lat, Long | Alt, m | place |", "|---|---|---|---|---|---|---|"]
     for command, rule in command_rules(USUAL_WP_RADIUS_CM, TAKEOFF_MAX_M).items():
         if command not in ROI_COMMANDS or command == Command.NAV_ROI:

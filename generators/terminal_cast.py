@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The README's cast of `naze-bridge demo --once`: `python -m generators.terminal_cast > docs/pictures/demo.svg`.
 
-The demonstration runs in a pseudo-terminal; each line of the picture appears when it was printed, stretched to 20 s.
+The demonstration runs in a pseudo-terminal. Each line of the picture appears when it was printed, stretched to 20 s.
 """
 
 import fcntl
@@ -27,7 +27,7 @@ _STYLE = """text{font:13px ui-monospace,monospace;fill:#e8ecef;white-space:pre;o
 
 
 def record(command: list[str]) -> list[tuple[float, str]]:
-    """Run a command in a terminal; each line with the second at which it was complete."""
+    """Run a command in a terminal. Each line with the second at which it was complete."""
     near, far = pty.openpty()
     fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack("HHHH", _ROWS, _COLUMNS, 0, 0))
     process = subprocess.Popen(command, stdin=far, stdout=far, stderr=far, env=os.environ | {"TERM": "xterm"})  # noqa: S603

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes schemas/*.json, the published JSON Schema of each key, from the payload types.
 
-Run by `make zenoh-schemas`; a test checks that the files are up to date.
+Run by `make zenoh-schemas`. A test checks that the files are up to date.
 """
 
 import inspect

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A zenoh configuration: its file, its endpoints, and why one rejects a session: zenoh reports only that it failed."""
+"""A zenoh configuration: the file, its endpoints, and why one rejects a session: zenoh reports only that it failed."""
 
 import json
 import os
@@ -31,7 +31,7 @@ _ENDPOINT = re.compile(r"(?P<protocol>[a-z_]+)/(?P<host>\[[^\]]*\]|[^:/?#]+):(?P
 _CONNECT_TIMEOUT_S = 2.0
 #: How long to wait for a rejection of our own certificate: in TLS 1.3 it comes after the handshake.
 _REFUSAL_S = 0.5
-#: X509_V_ERR_CERT_NOT_YET_VALID and _HAS_EXPIRED: a Pi without a network resumes the time of its last shutdown.
+#: X509_V_ERR_CERT_NOT_YET_VALID and _HAS_EXPIRED: a Pi without a network resumes the time of the last shutdown.
 _BY_CLOCK = (9, 10)
 _OVER_TCP = ("tcp", "tls", "ws")
 
@@ -79,7 +79,7 @@ def in_short(error: Exception) -> str:
 
 
 def all_endpoints(setting: Any) -> list[str]:
-    """All endpoints; a setting may have them per mode."""
+    """All endpoints. A setting may have them per mode."""
     by_mode = setting.values() if isinstance(setting, dict) else [setting]
     return [
         each["endpoint"] if isinstance(each, dict) else each for endpoints in by_mode if endpoints for each in endpoints

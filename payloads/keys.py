@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every key of a vehicle, in one table; docs/zenoh.md has the same one.
+"""Every key of a vehicle, in one table; docs/zenoh.md has the same.
 
 A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
 version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Verbatim
@@ -12,7 +12,7 @@ from enum import Enum
 
 from reports.vehicle_groups import Group
 
-#: The version of keys and payloads. A new field does not change it; a change that would mislead a reader raises it.
+#: The version of keys and payloads. A new field does not change it. A change that would mislead a reader raises it.
 VERSION = 1
 _V = f"v{VERSION}"
 
@@ -35,7 +35,7 @@ class QueryKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ZenohKey:
-    """One key. `schema`: file name below schemas/, without its suffix; None: the payload is raw MAVLink.
+    """One key. `schema`: file name below schemas/, without its suffix, or None if the payload is raw MAVLink.
 
     `kept`: the number of samples kept for subscribers that lost some; 0: none.
     """

@@ -124,7 +124,7 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
 
 
 def whole_number(data: Json, key: str, least: int, most: int) -> int:
-    """data[key]; ValueError if it is not a whole number from `least` to `most`."""
+    """data[key]. Raises ValueError if it is not a whole number from `least` to `most`."""
     value = data.get(key)
     if not _is_whole(value) or not least <= value <= most:
         raise ValueError(f"{key} must be a whole number from {least} to {most}")

@@ -12,7 +12,7 @@ _MAX_NAME = 64
 
 
 class ZenohSettingsError(ValueError):
-    """A zenoh setting that cannot be used; the text is one sentence."""
+    """A zenoh setting that cannot be used. The text is one sentence."""
 
 
 def host_name() -> str:

@@ -65,7 +65,7 @@ def overview_of(state: Json) -> Overview:
 
 
 def state_of(overview: Json) -> Json:
-    """The parts of a state that an overview has; None where it has none. It may be foreign."""
+    """The parts of a state that an overview has, or None where it has none. It may be foreign."""
 
     def scaled(name: str, scale: float) -> float | None:
         value = overview.get(name)

@@ -28,7 +28,7 @@ def encoding_of(key: ZenohKey) -> zenoh.Encoding:
 
 
 def attachment_of(key: ZenohKey) -> str | None:
-    """The attachment of a sample, as in "naze-bridge/v1/state"; None if it has none."""
+    """The attachment of a sample, as in "naze-bridge/v1/state", or None if it has none."""
     return None if key.schema is None or key is OVERVIEW else _SCHEMA + key.schema
 
 

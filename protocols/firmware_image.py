@@ -7,13 +7,13 @@ from binascii import unhexlify
 #: The address and size of an STM32F103CB's flash.
 FLASH_BASE = 0x0800_0000
 FLASH_SIZE = 0x2_0000
-#: A patched Harakiri keeps its missions and its configuration from this offset (firmware/README.md, Flash map).
+#: A patched Harakiri keeps the missions and the configuration from this offset (firmware/README.md, Flash map).
 PROGRAM_END = 0x1_D800
 _RAM, _RAM_SIZE = 0x2000_0000, 0x5000
 _HARAKIRI = b"Harakiri"
-#: The patch's table for checksums (naze_slots.c): Harakiri itself computes no CRC-32.
+#: The patch's table for checksums (naze_slots.c): Harakiri itself does not compute a CRC-32.
 PATCH_MARK = struct.pack("<4I", 0x0000_0000, 0x1DB7_1064, 0x3B6E_20C8, 0x26D9_30AC)
-# Types of records; those that set a base have it shifted by this many bits.
+# Types of records. Those that set a base have it shifted by this many bits.
 _HEX_DATA, _HEX_BASES = 0, {2: 4, 4: 16}
 
 
@@ -22,7 +22,7 @@ class ImageError(Exception):
 
 
 def parse_image(data: bytes, name: str) -> bytes:
-    """The flash from its first byte on: Intel HEX if the file's name ends in .hex, else a binary. ImageError."""
+    """The flash from the first byte on: Intel HEX if the file's name ends in .hex, else a binary. ImageError."""
     is_hex = name.lower().endswith(".hex")
     try:
         return _parse_hex(data) if is_hex else _parse_binary(data)
@@ -58,7 +58,7 @@ def check_harakiri(program: bytes) -> None:
 
 
 def _parse_binary(data: bytes) -> bytes:
-    """The flash from its first byte; it begins with the stack pointer and the entry, in Thumb code."""
+    """The flash from the first byte. It begins with the stack pointer and the entry, in Thumb code."""
     stack, entry = struct.unpack_from("<II", data)
     if not 0 < stack - _RAM <= _RAM_SIZE or not entry & 1 or not 0 <= entry - FLASH_BASE < len(data) <= FLASH_SIZE:
         raise ValueError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recognises FrSky hub telemetry, as Harakiri sends it at 9600 baud while armed with tele_prot 1 (its telemetry.c).
+"""Recognises FrSky hub telemetry, as Harakiri sends it at 9600 baud while armed with tele_prot 1 (the telemetry.c).
 
 A value is 0x5E, an id and two bytes; 0x5E and 0x5D among these are sent as 0x5D and the byte XOR 0x60. One more 0x5E
 ends a group of values. There is no checksum, so no value is read.
@@ -14,7 +14,7 @@ _VALUE_SIZE, _LONGEST = 3, 5
 
 
 class FrskyWatch:
-    """Feed bytes; `values_in_a_row`: consecutive values without a foreign byte between them."""
+    """Feed bytes. `values_in_a_row`: consecutive values without a foreign byte between them."""
 
     def __init__(self) -> None:
         self.values_in_a_row = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission item as sent in a message or a file; the records that flight controllers store, and a list's checksum."""
+"""A mission item as sent in a message or a file. The records that flight controllers store, and a list's checksum."""
 
 import math
 import zlib
@@ -100,16 +100,16 @@ def is_on_earth(lat_e7: int, lon_e7: int) -> bool:
 
 
 def degrees_to_e7(degrees: float) -> int | None:
-    """Round degrees to 1e-7 degrees; None if not a finite number (docs/mission-rules.md, "Each item")."""
+    """Round degrees to 1e-7 degrees. Returns None if not a finite number (docs/mission-rules.md, "Each item")."""
     scaled = degrees * 1e7  # may overflow to infinity on its own
     return round(scaled) if math.isfinite(scaled) else None
 
 
 class MissionRecord(Protocol):
-    """One record as a flight controller stores it; its number is its position in the list."""
+    """One record as a flight controller stores it. Its number is the position in the list."""
 
     def pack(self) -> bytes:
-        """The bytes; struct.error if a field does not fit, which is a bug in the caller."""
+        """The bytes. Raises struct.error if a field does not fit, which is a bug in the caller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,5 +128,5 @@ def pack_records(records: Iterable[MissionRecord]) -> bytes:
 
 
 def identify(records: Sequence[MissionRecord]) -> ListIdentity:
-    """The identity of a list; a Harakiri with the mission extension computes the same."""
+    """The identity of a list. A Harakiri with the mission extension computes the same."""
     return ListIdentity(len(records), zlib.crc32(pack_records(records)))

@@ -26,7 +26,7 @@ _STRANGERS = ("<", "{", "[", "PK")
 #: Digits that show any single-precision number exactly.
 _MOST_DIGITS = 9
 _MOST_WHOLE = 2**32
-#: The largest board has 981, an INAV with all its mode ranges. A daemon compares them on its event loop.
+#: The largest board has 981, an INAV with all the mode ranges. A daemon compares them on its event loop.
 MOST_SETTINGS = 1500
 
 
@@ -91,13 +91,13 @@ def is_setting_name(name: str) -> bool:
 
 
 def setting_name(name: bytes) -> PlainText:
-    """A board's name of a setting; empty if it is impossible."""
+    """A board's name of a setting, or empty if it is impossible."""
     text = plain_text(name)
     return text if is_setting_name(text) and text.encode() == name else PlainText("")
 
 
 def shown_value(value: float | str) -> str:
-    """The shortest text of the value; of a fraction, the shortest that is equal in single precision."""
+    """The shortest text of the value. Of a fraction, the shortest that is equal in single precision."""
     if isinstance(value, str):
         return plain_text(value)
     if _is_whole(value):

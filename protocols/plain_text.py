@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Text of others, made safe to show, because a terminal would obey escape sequences in it; and files of others."""
+"""Text of others, made safe to show, because a terminal would obey escape sequences in it, and files of others."""
 
 import codecs
 from typing import NewType

@@ -30,7 +30,7 @@ _SAVE = "save"
 
 
 class SavedSettings(NamedTuple):
-    """The values by name. A dump has texts, of a choice its name; a .param file has the number.
+    """The values by name. A dump has texts, of a choice its name. A .param file has the number.
 
     board: the flight controller they are from, "" if the file lacks it. unread: the numbers of lines of a dump that are
     no settings, or of a profile that is not selected, and their first word.
@@ -43,7 +43,7 @@ class SavedSettings(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A setting. profile: its kind and number, empty for none."""
+    """A setting. profile: the kind and number, empty for none."""
 
     number: int
     name: str

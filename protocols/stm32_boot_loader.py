@@ -57,7 +57,7 @@ def synchronise(within_s: float, is_waiting: Callable[[], None] = lambda: None) 
     """Reach the point where the next command can be sent. BootLoaderError if there is no boot loader within this time.
 
     INIT sets the speed after a reset. A boot loader that is in use takes it as a part of a command, whose rest the
-    fillers complete with a wrong checksum. Before them INIT is sent only once: as a page number and its checksum, two
+    fillers complete with a wrong checksum. Before them INIT is sent only once: as a page number and the checksum, two
     would erase the last page. Fillers alone could only erase page 0. `is_waiting` is called if nothing answers at once.
     """
     yield _bytes(bytes((INIT,)), 1, _INIT_S)

@@ -40,7 +40,7 @@ def tlog_records(frames: Iterable[bytes], at_us: int) -> bytes:
 
 
 def heartbeat_type(frame: bytes) -> int | None:
-    """The MAV_TYPE in a HEARTBEAT frame; None for other messages."""
+    """The MAV_TYPE in a HEARTBEAT frame, or None for other messages."""
     found = MavlinkFrame(frame)
     if found.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
         return None
@@ -54,7 +54,7 @@ def first_stamp_us(records: bytes) -> int:
 
 
 def _loggable(frame: bytes) -> bytes:
-    """A MAVLink 2 frame as it is logged; empty if it must not be."""
+    """A MAVLink 2 frame as it is logged, or empty if it must not be."""
     if frame[_MSGID] == _SETUP_SIGNING:
         return b""
     return _without_signature(frame) if frame[2] & _SIGNED else frame

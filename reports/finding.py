@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finding: one change, drop or rejection by the mission rules, and its text for the pilot."""
+"""A finding: one change, drop or rejection by the mission rules, and the text for the pilot."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class Finding:
         return f"{subject}: {change} ({self.why})" if change else f"{subject}: {self.why}"
 
     def _change(self) -> str:
-        """The old and the new value; empty if the reason alone says more."""
+        """The old and the new value, or empty if the reason alone says more."""
         is_place = self.field in ("lat_e7", "lon_e7")
         is_return = self.command == Command.NAV_RETURN_TO_LAUNCH and self.field == "alt_m"
         is_told = (is_place or is_return) and self.is_warning

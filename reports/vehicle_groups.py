@@ -11,7 +11,7 @@ from typing import Annotated
 
 
 class Group(Enum):
-    """The groups; each is published as a whole."""
+    """The groups. Each is published as a whole."""
 
     ATTITUDE = "attitude"
     POSITION = "position"

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from protocols.mission_item import MissionItem, MissionRecord, MissionResult
 from reports.finding import Finding, RejectingFinding
 
-#: Item numbers of a list as sent, by its item numbers as read back; None: not sent.
+#: Item numbers of a list as sent, by the item numbers as read back; None: not sent.
 SentSeqs = tuple[int | None, ...]
 RecordT = TypeVar("RecordT", bound=MissionRecord)
 
@@ -28,8 +28,8 @@ class Verdict(Generic[RecordT]):
 
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
-    interest). `sent_seqs` has, for each of `items`, the number of the item as sent; None: a speed change that was
-    inserted. `flight`: its length, heights and end in words. `findings` are in the order of the list; that of a
+    interest). `sent_seqs` has, for each of `items`, the number of the item as sent, or None if a speed change that was
+    inserted. `flight`: the length, heights and end in words. `findings` are in the order of the list. That of a
     rejection is the last.
     """
 

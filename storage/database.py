@@ -43,7 +43,7 @@ _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 
 
 def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | None]:
-    """Open or create the database; also returns the new path of a damaged file.
+    """Open or create the database. Also returns the new path of a damaged file.
 
     `now`: unix seconds, for the name of such a file. The caller holds the directory's state_lock: no other process
     may have a file open that is renamed. StoreError if the file cannot be opened, created or written.
@@ -69,7 +69,7 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
 
 
 def read_database(path: Path) -> sqlite3.Connection:
-    """Open the database read-only, with or without a running daemon; StoreError if that fails.
+    """Open the database read-only, with or without a running daemon. Raises StoreError if that fails.
 
     The reader may be root, and the file from a service that was taken over.
     """
@@ -138,7 +138,7 @@ def configured(connection: sqlite3.Connection) -> sqlite3.Connection:
 
 
 def _make_ready(connection: sqlite3.Connection) -> bool:
-    """Prepare the connection; False if a page or the schema is damaged, or of another release."""
+    """Prepare the connection. Returns False if a page or the schema is damaged, or of another release."""
     try:
         # Reads every page. integrity_check would also look up every row in every index: slow, for little use.
         (finding,) = connection.execute("PRAGMA quick_check(1)").fetchone()
@@ -197,7 +197,7 @@ def _prepare(connection: sqlite3.Connection) -> None:
     connection.execute("PRAGMA synchronous = FULL")  # NORMAL would lose the last commits in a power cut
     # KiB. The default of 2 MB would let the daemon grow with every mission.
     connection.execute("PRAGMA cache_size = -256")
-    # Finds a read-only file now, not when a mission arrives. Rolled back, it takes no space.
+    # Finds a read-only file now, not when a mission arrives. Rolled back, it does not take space.
     connection.executescript("BEGIN; PRAGMA user_version = 0; ROLLBACK")
     _create_tables(connection)
 

@@ -22,9 +22,9 @@ from storage.salvage import salvage
 from storage.settings_backups import SettingsBackups
 from storage.store_error import StoreError, explained
 
-PENDING = "PENDING"  # the outcome until conclude(); it stays if the daemon dies before
+PENDING = "PENDING"  # the outcome until conclude(). It stays if the daemon dies before
 VERIFIED = "VERIFIED"  # the outcome that latest_verified() looks for
-DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match its checksum
+DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match the checksum
 
 #: The size limit of the store, bytes.
 BUDGET = 200 << 20
@@ -36,7 +36,7 @@ _BUDGET_IN_MEMORY = 8 << 20
 
 @dataclass(frozen=True, slots=True)
 class ReceivedMission:
-    """A mission list and its verdict.
+    """A mission list and the verdict.
 
     The dictionaries hold JSON values, NaN and infinities. received_at: unix seconds. source: the sender, e.g.
     "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
@@ -93,7 +93,7 @@ class StoredMission:
 
 
 class MissionStore:
-    """The missions of one state directory. One thread at a time; every method may raise StoreError.
+    """The missions of one state directory. One thread at a time. Every method may raise StoreError.
 
     >>> with open_store(state_dir / "missions.db", time.time()).store as store:
     ...     number = store.add(received)
@@ -120,7 +120,7 @@ class MissionStore:
             self._connection.close()
 
     def add(self, received: ReceivedMission, sender: str = "") -> int:
-        """Store a mission with the outcome PENDING; returns its number, which increases with every mission.
+        """Store a mission with the outcome PENDING. Returns its number, which increases with every mission.
 
         sender: the ground station that counts the items as in this list, see item_numbers().
         A full store drops others first: rejected and cancelled ones before the rest, verified ones last.
@@ -240,7 +240,7 @@ class MissionStore:
         )
 
     def _line(self, number: int) -> MissionSummary | None:
-        """The line of a mission; None if there is none, StoreError if it is corrupt."""
+        """The line of a mission, or None if there is none, StoreError if it is corrupt."""
         for line in self._summaries("WHERE number = ?", number):
             if line.outcome == DAMAGED:
                 raise self._damaged(number)
@@ -277,7 +277,7 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use. `set_aside`: the path of a damaged one; `salvaged`: the missions recovered from it."""
+    """A store ready for use. `set_aside`: the path of a damaged one. `salvaged`: the missions recovered from it."""
 
     store: MissionStore
     set_aside: Path | None

@@ -22,7 +22,7 @@ _BACKUP = {"settings_backups": BACKUP}
 
 
 def salvage(damaged: Path, store: sqlite3.Connection) -> int:
-    """Copy the intact rows from the file `damaged`, which is not changed; returns the number of missions.
+    """Copy the intact rows from the file `damaged`, which is not changed. Returns the number of missions.
 
     SQLite reads a copy in the same directory, because opening applies the log, and /tmp may be too small.
     """
@@ -52,7 +52,7 @@ def _copy_all(path: Path, store: sqlite3.Connection) -> int:
 
 
 def _last(source: sqlite3.Connection, table: str) -> int:
-    """The last number that the table ever had; 0 if it cannot be read."""
+    """The last number that the table ever had, or 0 if it cannot be read."""
     last = 0
     for question in (f"SELECT max(number) FROM {table}", f"SELECT seq FROM sqlite_sequence WHERE name = '{table}'"):  # noqa: S608
         with suppress(*FAILURES, TypeError, ValueError):

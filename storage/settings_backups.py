@@ -23,8 +23,8 @@ SettingValues = Mapping[str, float | str]
 class BackupLine:
     """One line of a list of backups.
 
-    board: distinguishes boards of one kind. kind: the firmware and its version. taken_at: unix seconds. occasion: why
-    it was taken. changed_count: settings that differ from this board's last backup; None for its first.
+    board: distinguishes boards of one kind. kind: the firmware and the version. taken_at: unix seconds. occasion: why
+    it was taken. changed_count: settings that differ from this board's last backup, or None for the first.
     """
 
     number: int
@@ -38,14 +38,14 @@ class BackupLine:
 
 @dataclass(frozen=True, slots=True)
 class SettingsBackup:
-    """A backup with its values by name."""
+    """A backup with the values by name."""
 
     line: BackupLine
     values: SettingValues
 
 
 class SettingsBackups:
-    """The backups in one store. One thread at a time; every method may raise StoreError."""
+    """The backups in one store. One thread at a time. Every method may raise StoreError."""
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self._connection = connection
@@ -98,11 +98,11 @@ class SettingsBackups:
         return SettingsBackup(BackupLine(*line), json.loads(contents))
 
     def newest(self) -> int | None:
-        """The number of the last backup of any board; None if there is none."""
+        """The number of the last backup of any board, or None if there is none."""
         return self._newest("TRUE")
 
     def before(self, backup: BackupLine) -> int | None:
-        """The number of the same board's backup before this one; None if there is none."""
+        """The number of the same board's backup before this one, or None if there is none."""
         return self._newest("board = ? AND kind = ? AND number < ?", backup.board, backup.kind, backup.number)
 
     def list(self, limit: int) -> builtins.list[BackupLine]:

@@ -10,7 +10,7 @@ _NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)  # Windows, where `naze-bridge car
 
 
 def read_bounded(path: Path, most: int, *, follows_links: bool = True) -> bytes:
-    """The contents; OSError if the file cannot be read, is larger than `most` bytes, or is a pipe or a device.
+    """The contents. Raises OSError if the file cannot be read, is larger than `most` bytes, or is a pipe or a device.
 
     Those might never end, or never begin. follows_links: False for root in a folder that another user controls.
     """
@@ -33,7 +33,7 @@ def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
 
 
 def replace_file(path: Path, data: bytes, mode: int = 0o600) -> None:
-    """Replace the file's content with `data`; on OSError the old content is kept."""
+    """Replace the file's content with `data`. On OSError the old content is kept."""
     draft = path.with_name(f"{path.name}.new")
     # Not through a link: a root daemon may have been given a folder that another user can write to.
     descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)

@@ -19,9 +19,9 @@ class StateUnusableError(StoreError):
 
 @contextmanager
 def state_lock(directory: Path) -> Iterator[None]:
-    """Create the directory if necessary and lock it without waiting; the kernel releases it when the process dies.
+    """Create the directory if necessary and lock it without waiting. The kernel releases it when the process dies.
 
-    StoreError if another process holds it; StateUnusableError if it cannot be created or written.
+    StoreError if another process holds it. Raises StateUnusableError if it cannot be created or written.
 
     The lock file holds the holder's process id. It is never removed: a second process could hold the removed
     file and a third one a new file.

@@ -23,7 +23,7 @@ _REASONS = {
 }
 
 
-# Raised by the sqlite3 module; the second if SQLite's own message contains a corrupt name.
+# Raised by the sqlite3 module. The second if SQLite's own message contains a corrupt name.
 FAILURES = (sqlite3.Error, UnicodeDecodeError)
 
 

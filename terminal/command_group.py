@@ -22,7 +22,7 @@ class CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; UsageError with a suggestion if there is none of that name."""
+        """Find the command. Raises UsageError with a suggestion if there is none of that name."""
         name, known = args[0], self.list_commands(ctx)
         if name not in known and not name.startswith("-"):
             near = difflib.get_close_matches(name.lower(), known, n=1)

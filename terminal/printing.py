@@ -34,7 +34,7 @@ def progress_bars(on: "Console") -> "Progress":
 
 
 def print_table(table: "Table") -> None:
-    """Print a table without trailing blanks, at least as wide as its values: a shortened number would be wrong."""
+    """Print a table without trailing blanks, at least as wide as the values: a shortened number would be wrong."""
     from rich.measure import Measurement
 
     on = console()

@@ -15,7 +15,7 @@ UNREADABLE = 2
 
 
 def say(text: str, *, to_error: bool = False, prefix: str = "", indent: int = 0) -> None:
-    """Print `text` after `prefix`, which is `indent` columns wide; further lines are indented as much."""
+    """Print `text` after `prefix`, which is `indent` columns wide. Further lines are indented as much."""
     if (sys.stderr if to_error else sys.stdout).isatty():
         width = max(shutil.get_terminal_size().columns - indent, 20)
         fit = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)

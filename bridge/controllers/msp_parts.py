@@ -41,7 +41,7 @@ class _Place(NamedTuple):
 
 
 class MspPartSettings(FcSettings):
-    """Some parts of a board's settings; all that its firmware has, if none is named."""
+    """Some parts of a board's settings. All that its firmware has, if none is named."""
 
     def __init__(self, board: FlightController, *parts: SettingsRequest) -> None:
         self._parts = parts or SETTINGS[board.firmware]
@@ -51,7 +51,7 @@ class MspPartSettings(FcSettings):
         #: Names of modes, by permanent id.
         self._modes: Mapping[int, str] = {}
         self._accepts_any_byte = board.profile.accepts_any_byte
-        #: The last payloads, by command; empty for a command that the board does not know.
+        #: The last payloads, by command, or empty for a command that the board does not know.
         self._held: dict[int, bytes] = {}
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
@@ -104,7 +104,7 @@ class MspPartSettings(FcSettings):
         return self._shown(part, (yield from self.payload(part.command)) or b"")
 
     def payload(self, command: int) -> Conversation[bytes | None]:
-        """The reply's payload, empty if the board does not know the command; None if it does not answer."""
+        """The reply's payload, empty if the board does not know the command, or None if it does not answer."""
         right = msp_right(self._firmware, command, b"")
         held = self._held.get(command)
         if right.effect is not Effect.READ or held == b"":
@@ -151,7 +151,7 @@ def _name(words: str) -> str:
 
 
 def _payloads(before: bytes, place: Field | int, value: Value) -> list[bytes] | None:
-    """The payloads that set a value; None without room for it. ValueError: the form of a mode's ranges."""
+    """The payloads that set a value, or None without room for it. ValueError: the form of a mode's ranges."""
     if isinstance(place, Field):
         return [place.put(before, int(value))]
     return range_writes(before, place, str(value))

@@ -70,7 +70,7 @@ class LegLimits:
         yield from first_of([(leg.target, high) for leg in too_high], "alt_m")
         stop = f"leg of {self.stops_at_m} m or more: stops there"
         yield from first_of([(leg.cause, stop) for leg in legs if leg.length_m >= self.stops_at_m], "lat_e7")
-        # With a region of interest set, MultiWii compares its distance with wp_radius, not the waypoint's.
+        # With a region of interest set, MultiWii compares the distance with wp_radius, not the waypoint's.
         near_m = self.radius_cm / 100 + _STRAYS_M
         near = f"passes the ROI within {near_m:g} m: may end there"
         passing = [leg for leg in legs if leg.roi and passing_distance_m(leg.start, leg.end, leg.roi) < near_m]
@@ -95,7 +95,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         longest_hold=Range(0, 65, "it holds at most 65 s"),
         ends_on_any_record=False,
         own_rth_landing=True,
-        # Its defaults; a board reports its own (NAV_CONFIG).
+        # The defaults. A board reports its own (NAV_CONFIG).
         limits=USUAL_LEGS,
     )
 
@@ -108,7 +108,7 @@ class MultiwiiMissions(NavMissions):
     _empty: tuple[NavRecord, ...] = NOTHING
 
     def report(self) -> Conversation[StoreReport | None]:
-        """Also read the limits of its legs: the pilot may change these settings at any time."""
+        """Also read the limits of the legs: the pilot may change these settings at any time."""
         config = yield from ask(request(Nav.NAV_CONFIG), Nav.NAV_CONFIG, NAV_CONFIG_SIZE)
         limits = None if config is None else decode_nav_limits(config.payload)
         if limits is not None:

@@ -73,7 +73,7 @@ def fixed(setting: BoardSetting) -> SettingRefusal:
 class TableReading:
     """How to read a table.
 
-    pace: the pause in s after this many bytes, which leaves telemetry its share of the line. is_doubtful: True if
+    pace: the pause in s after this many bytes, which leaves telemetry the share of the line. is_doubtful: True if
     settings may have changed without the bridge since the last reading.
     """
 
@@ -86,7 +86,7 @@ class FcSettings(ABC):
 
     @abstractmethod
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
-        """All settings; None if the board does not answer. Other work may use the line at each Pause.
+        """All settings, or None if the board does not answer. Other work may use the line at each Pause.
 
         previous: as last read, maybe from another board: it may be returned if it is still the board's.
         """
@@ -97,10 +97,10 @@ class FcSettings(ABC):
 
     @abstractmethod
     def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
-        """A setting that was written, as the board holds it, and maybe others; empty if it does not answer."""
+        """A setting that was written, as the board holds it, and maybe others, or empty if it does not answer."""
 
     def save(self) -> Conversation[SettingRefusal | None]:
-        """Write the settings in RAM to the board's flash; None if they are stored."""
+        """Write the settings in RAM to the board's flash. Returns None if they are stored."""
         return write_eeprom()
 
 

@@ -20,7 +20,7 @@ from protocols.msp.telemetry import Sensor
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
 #: Five lost heartbeats. Only then is a new system id followed, if its component id is the same.
 _GONE_S = 5.0
-#: The autopilot field of a heartbeat's payload, and its value from cameras and gimbals. MAVLink 2 may omit it.
+#: The autopilot field of a heartbeat's payload, and the value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
 _MAX_RSSI, _CHANNELS = 254, 18
@@ -148,7 +148,7 @@ class MavlinkTelemetry:
         self._readings = readings
         #: The newest frame of each kind, and when it was heard. The keys are those of protocols.mavlink.frame.kinds.
         self._unread: dict[bytes, tuple[bytes, float]] = {}
-        #: The message ids of the kinds that the autopilot sends and that are read; its heartbeats.
+        #: The message ids of the kinds that the autopilot sends and that are read; the heartbeats.
         self._known: dict[bytes, int] = {}
         self._beats: set[bytes] = set()
         self._compid: int | None = None

@@ -23,7 +23,7 @@ from reports.vehicle_groups import Progress
 
 #: A build without mission flight refuses it, and is not asked again.
 FLIGHT_POLL = Poll(Msp.FLIGHT, FLIGHT_REQUEST, FLIGHT_SIZE, 0.5)
-#: The craft does something else than its list: flies home, or lands where it is.
+#: The craft does something else than the list: flies home, or lands where it is.
 _EMERGENCIES = frozenset(
     (FlightReason.RTL, FlightReason.FAILSAFE, FlightReason.HOLD_LOST, FlightReason.BLIND, FlightReason.BATTERY)
 )
@@ -78,7 +78,7 @@ def _warning(progress: FlightProgress) -> Happening | None:
 
 
 def _has_landed(before: FlightReport) -> bool:
-    """At the end of its list."""
+    """At the end of the list."""
     return (before.stage is Stage.LANDING and before.progress is Progress.ACTIVE) or (
         before.progress is Progress.COMPLETE and not before.is_flown
     )

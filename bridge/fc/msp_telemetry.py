@@ -52,7 +52,7 @@ _RATES_STALE_S = 0.3
 
 
 def hear_msp(vehicle: v.Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
-    """Take one reply. Errors, replies that are too short and other commands change nothing."""
+    """Take one reply. Errors, replies that are too short and other commands do not change anything."""
     decode = controller.profile.decoders.get(frame.command) or _DECODERS.get(frame.command)
     if decode is not None and frame.direction is Direction.REPLY:
         decode(vehicle, frame.payload, controller, now)
@@ -100,7 +100,7 @@ def _course_deg(vehicle: v.Vehicle, gps: RawGps) -> float | None:
 
 
 def velocity(speed_m_s: float, course_deg: float | None) -> tuple[float | None, float | None]:
-    """North and east parts of a speed over ground; None while it moves and the course is unknown."""
+    """North and east parts of a speed over ground, or None while it moves and the course is unknown."""
     if course_deg is None:
         return (None, None) if speed_m_s else (0.0, 0.0)
     course = math.radians(course_deg)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The profile of a flight controller, everything specific to one kind of board; and the questions that identify it.
+"""The profile of a flight controller, everything specific to one kind of board, and the questions that identify it.
 
-`bridge.controllers.table` lists the profiles. To add a flight controller, write its profile in its own file under
-`bridge/controllers/` and add it to that list; nothing else asks what kind of board it is.
+`bridge.controllers.table` lists the profiles. To add a flight controller, write the profile in its own file under
+`bridge/controllers/` and add it to that list. Nothing else asks what kind of board it is.
 """
 
 from collections.abc import Callable, Mapping
@@ -46,9 +46,9 @@ class Interview:
         self._replies: dict[int, MspFrame] = {}
 
     def ask(self, command: int, reply_payload: int, *, stable: int | None = None) -> Conversation[MspFrame]:
-        """Ask `command`; the reply may be an error frame, which means that the board does not know it.
+        """Ask `command`. The reply may be an error frame, which means that the board does not know it.
 
-        stable: how many of its first bytes must agree, if the others may change at any moment.
+        stable: how many of the first bytes must agree, if the others may change at any moment.
         """
         if command not in self._replies:
             reply = yield from ask_surely(request(command), command, reply_payload, stable=stable)
@@ -58,11 +58,11 @@ class Interview:
         return self._replies[command]
 
     def ident(self) -> Conversation[Ident | None]:
-        """IDENT; None on boards that have dropped it (INAV, Betaflight)."""
+        """IDENT, or None on boards that have dropped it (INAV, Betaflight)."""
         return decode_ident((yield from self.ask(Msp.IDENT, _IDENT_SIZE)).payload)
 
     def variant(self) -> Conversation[str | None]:
-        """FC_VARIANT, four letters; None on boards older than it."""
+        """FC_VARIANT, four letters, or None on boards older than it."""
         reply = yield from self.ask(Msp.FC_VARIANT, _VARIANT_SIZE)
         return plain_text(reply.payload) if reply.direction is Direction.REPLY else None
 
@@ -79,24 +79,24 @@ class Interview:
         return decode_box_names((yield from self.ask(Msp.BOXNAMES, _MAX_REPLY_PAYLOAD)).payload)
 
     def boxes_by_id(self, names: Mapping[int, str]) -> Conversation[tuple[str, ...]]:
-        """The same by permanent id, "" for ids not in `names`; with many boxes BOXNAMES outgrows a frame."""
+        """The same by permanent id, "" for ids not in `names`. With many boxes BOXNAMES outgrows a frame."""
         ids = (yield from self.ask(Msp.BOXIDS, _MAX_REPLY_PAYLOAD)).payload
         return tuple(names.get(number, "") for number in ids)
 
 
 class Spoken(Enum):
-    """The protocols that a flight controller may speak; in its command line it answers none of them."""
+    """The protocols that a flight controller may speak. In its command line it answers none of them."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
-    #: An autopilot that represents itself to ground stations. The bridge sends nothing in its name.
+    #: An autopilot that represents itself to ground stations. The bridge does not send anything in its name.
     OTHER_MAVLINK = "MAVLink, passed through"
     FRSKY = "FrSky"
     CLI = "command line"
 
 
 class Autopilot(Enum):
-    """A setting: the sender of MAVLink on the port. AUTO: known from MSP on this port, or from its ids.
+    """A setting: the sender of MAVLink on the port. AUTO: known from MSP on this port, or from the ids.
 
     HARAKIRI is translated, OTHER is passed through.
     """
@@ -110,7 +110,7 @@ class Autopilot(Enum):
 Decoder = Callable[[Vehicle, bytes, "FlightController", float], None]
 
 MSP_SILENCE_S = 2.0
-#: An STM32H743 erases the sector of its settings in up to 2.2 s.
+#: An STM32H743 erases the sector of the settings in up to 2.2 s.
 SILENCE_WITH_H7_S = 2.5
 
 NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, sentences.NO_MISSIONS())
@@ -216,7 +216,7 @@ class FlightController:
 
     @property
     def kind(self) -> str:
-        """The firmware and its version."""
+        """The firmware and the version."""
         version = "" if self.version is None else " " + ".".join(map(str, self.version))
         return self.name + version
 

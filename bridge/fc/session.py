@@ -70,7 +70,7 @@ class FcSession:
         return self._port.met_family
 
     def flight_memory(self, now: float) -> FlightMemory | None:
-        """The facts about an armed craft that a restarted bridge needs; None unless it is armed."""
+        """The facts about an armed craft that a restarted bridge needs, or None unless it is armed."""
         family = self._port.family
         return None if family is None else self.vehicle.memory(family, now)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and rewrites a Naze32's flash through its boot loader, which a disarmed Harakiri enters by its command line.
+"""Reads and rewrites a Naze32's flash through the boot loader, which a disarmed Harakiri enters by the command line.
 
 Only pages that differ are erased and written, so repeating an interrupted flash resumes it. Page 0 is erased
-first, and its first bytes, the stack pointer and the start address, are written last: half a program never runs.
+first, and the first bytes, the stack pointer and the start address, are written last: half a program never runs.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ _BLANK = b"\xff"
 _START_SIZE = 8
 #: Opens the command line.
 _OPEN = b"\r\r\r"
-#: A calibration stops the main loop for longer; then the command line does not open, and nothing is lost.
+#: A calibration stops the main loop for longer, then the command line does not open, and nothing is lost.
 _OPEN_S = 5.0
 _DUMP_S = 5.0
 #: systemReset() waits for a second.
@@ -122,7 +122,7 @@ def _repeated(command: Callable[[], Dialogue[T]]) -> Dialogue[T]:
 
 
 def _attempt(command: Dialogue[T]) -> Dialogue[T | None]:
-    """Carry out a command. None: it failed, and the next one can be sent. FlashingError."""
+    """Carry out a command. None: it failed, and the next can be sent. FlashingError."""
     try:
         return (yield from command)
     except BootLoaderError:
@@ -140,7 +140,7 @@ class CommandLineError(Exception):
 
 
 def read_dump() -> Dialogue[str]:
-    """Open the command line; return the output of `dump`. CommandLineError: it is closed again."""
+    """Open the command line. Return the output of `dump`. CommandLineError: it is closed again."""
     if not (yield Exchange(_OPEN, _OPEN_S, _is_prompt)).endswith(PROMPT):
         raise CommandLineError("its command line does not open: switch it off and on, then try again")
     printed = yield Exchange(b"dump\r", _DUMP_S, _is_prompt)
@@ -152,7 +152,7 @@ def read_dump() -> Dialogue[str]:
 
 
 def settings_in(dump: str) -> dict[str, float]:
-    """The settings of `set` in a dump, by name; they are rounded to three decimals."""
+    """The settings of `set` in a dump, by name. They are rounded to three decimals."""
     found = {}
     for line in dump.splitlines():
         name, is_setting, value = line.partition(" = ")

@@ -82,7 +82,7 @@ class TokenBucket:
         return self._used + 1.0 <= self._rate.burst
 
     def spend(self, amount: float = 1.0) -> None:
-        """Count one; a negative amount takes it back."""
+        """Count one. A negative amount takes it back."""
         self._used += amount
 
     def take(self, now: float) -> bool:
@@ -102,7 +102,7 @@ class Budget:
         self._own: dict[Cost, TokenBucket] = {}
 
     def allows(self, cost: Cost, now: float, *, is_proven: bool = False) -> bool:
-        """Count work; False if it exceeds a limit. Work of a station with proven rights is not in the total."""
+        """Count work. Returns False if it exceeds a limit. Work of a station with proven rights is not in the total."""
         own = self._own.get(cost)
         if own is None:
             own = self._own[cost] = TokenBucket(cost.each)

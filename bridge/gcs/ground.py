@@ -15,7 +15,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkFrame
 
-#: A UDP station that is silent for this long has left; a TCP station leaves with its connection.
+#: A UDP station that is silent for this long has left; a TCP station leaves with the connection.
 EXPIRY_S = 60.0
 #: This time applies to a station whose ids have all moved to another address, as after Wi-Fi roaming.
 MOVED_S = 5.0
@@ -72,7 +72,7 @@ class Ground:
     # The connected stations.
 
     def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        """Send to `peer` before it is heard; `until_answered`: only while no peer is heard on its link (broadcast)."""
+        """Send to `peer` before it is heard. `until_answered`: only while no peer is heard on the link (broadcast)."""
         self._default_peers[peer] = until_answered
         if self.station(peer) is None:
             self._unheard[peer] = self._made(peer)
@@ -84,7 +84,7 @@ class Ground:
         self._has_changed()
 
     def remove_link(self, name: str) -> list[Peer]:
-        """Forget all stations on a link; returns those that were heard."""
+        """Forget all stations on a link. Returns those that were heard."""
         for peer in [peer for peer in self._default_peers if peer.link == name]:
             self.remove_default_peer(peer)
         heard = [peer for peer in self._heard if peer.link == name]
@@ -113,7 +113,7 @@ class Ground:
         self.everyone = [*self._heard.values(), *unheard]
 
     def gone(self, peer: Peer) -> None:
-        """Forget a station; a configured one starts from scratch."""
+        """Forget a station. A configured one starts from scratch."""
         for stations in (self._unheard, self._heard, self._unproven):
             if (station := stations.pop(peer, None)) is not None:
                 station.has_left = True
@@ -152,7 +152,7 @@ class Ground:
     def received(
         self, peer: Peer, data: bytes, now: float, *, datagram: bool
     ) -> tuple[GroundStation, Sequence[MavlinkFrame]] | None:
-        """The station that a read or a datagram came from, and its frames; None if it sends too many.
+        """The station that a read or a datagram came from, and the frames, or None if it sends too many.
 
         A datagram holds whole frames only, and its address may be made up, unlike that of a connection: a new station
         is remembered when it is admitted.
@@ -186,9 +186,9 @@ class Ground:
         )
 
     def heard(self, station: GroundStation, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender | None:
-        """Note a frame, and find its sender; None if that must first show that it receives what is sent to it.
+        """Note a frame, and find the sender. Returns None if that must first show that it receives what is sent to it.
 
-        On an own network it is answered meanwhile, but gets no telemetry.
+        On an own network it is answered meanwhile, but does not get telemetry.
         """
         path, peer = station.return_path, station.peer
         sender = station.heard(frame, ids, now)

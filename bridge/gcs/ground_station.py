@@ -36,7 +36,7 @@ _NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
 _ROUTINE = Effect.RATE, Effect.SILENCE
 #: A frame whose number is at most this far behind the newest one was delayed by the network.
 _MOST_LATE = 32
-#: After such a silence a sender may have been restarted, and numbers its frames from 0 again.
+#: After such a silence a sender may have been restarted, and numbers the frames from 0 again.
 _RESTARTED_S = 1.0
 
 
@@ -54,7 +54,7 @@ class Outbox:
         self._text_id = 0
 
     def take(self) -> Datagrams:
-        """The datagrams to send; those of one station are in order."""
+        """The datagrams to send. Those of one station are in order."""
         datagrams = Datagrams()
         for station, frames in self.outgoing.items():
             if station.return_path is not None:
@@ -132,7 +132,7 @@ class Outbox:
     def _send_pieces(self, severity: Severity, texts: Sequence[str], receivers: Sequence["GroundStation"]) -> None:
         self._text_id = self._text_id % _MAX_TEXT_ID + 1
         for chunk, piece in enumerate(texts):
-            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces; Mission Planner shows each separately.
+            # With an id, MAVSDK, MAVProxy and QGroundControl join the pieces. Mission Planner shows each separately.
             text_id = self._text_id if len(texts) > 1 else 0
             message = messages.MAVLink_statustext_message(severity, piece.encode("ascii", "replace"), text_id, chunk)
             self.multicast(pack(message), receivers)
@@ -141,7 +141,7 @@ class Outbox:
 class Sender:
     """A sysid and compid at a ground station's address, from which a message came and which gets the answers.
 
-    It knows the order of its frames, and its mission transfers.
+    It knows the order of the frames, and the mission transfers.
     Senders number their frames from 0 to 255 again and again: a gap shows that a frame was lost, an older number that a
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
@@ -165,7 +165,7 @@ class Sender:
     def __init__(self, station: "GroundStation", sysid: int, compid: int) -> None:
         self.station, self.sysid, self.compid = station, sysid, compid
         self.heard_at = -inf
-        #: The number of the last frame, and of the newest one with its bytes.
+        #: The number of the last frame, and of the newest one with the bytes.
         self.number = 0
         self._newest = 0, b""
         #: The frames sent so far, as far as their numbers show; those that have not arrived, and the last one of them.
@@ -174,7 +174,7 @@ class Sender:
         self.last_lost = -1
         #: is_late: the last frame was sent before one that arrived earlier. is_copy: the network delivered it twice.
         self.is_late = self.is_copy = False
-        #: State kept after its last transfers, by MAV_MISSION_TYPE.
+        #: State kept after the last transfers, by MAV_MISSION_TYPE.
         self.transfers: dict[int, TransferMemory] = defaultdict(TransferMemory)
 
     def heard(self, frame: MavlinkFrame, now: float) -> None:
@@ -203,7 +203,7 @@ class Sender:
 
     @property
     def name(self) -> str:
-        """The kind of station and its host, for the pilots of others."""
+        """The kind of station and the host, for the pilots of others."""
         title, host = self.station.behaviour.kind.title, self.peer.host
         return " ".join(filter(None, (title, host if isinstance(host, str) else ""))) or "another station"
 
@@ -281,7 +281,7 @@ class GroundStation:
         #: A newcomer gets more heartbeats until this time, then home and the reasons not to arm.
         self.greeted_until = -inf
         self.is_informed = True
-        #: One of its missions was accepted: it has been told that fences are not stored.
+        #: One of the missions was accepted: it has been told that fences are not stored.
         self.has_written = False
 
     # Rights and limits.
@@ -305,7 +305,7 @@ class GroundStation:
         return FrameRefusal(why, effect in _ROUTINE)
 
     def passing_refusal(self, effect: Effect) -> FrameRefusal | None:
-        """The reason for not passing an accepted frame to an autopilot in pass-through; also used for Set WP."""
+        """The reason for not passing an accepted frame to an autopilot in pass-through. Also used for Set WP."""
         if effect in self.rights.autopilot:
             return None
         if self.is_listener:
@@ -318,7 +318,7 @@ class GroundStation:
         self.is_listener = self.standing is Standing.LISTENER
 
     def allows(self, cost: Cost, now: float | None = None) -> bool:
-        """Count work caused by the last message of the station, or at `now`; False if it exceeds the limit."""
+        """Count work caused by the last message of the station, or at `now`. Returns False if it exceeds the limit."""
         is_proven = self.standing is Standing.PROVEN
         return self.budget is None or self.budget.allows(
             cost, self.heard_at if now is None else now, is_proven=is_proven
@@ -330,7 +330,7 @@ class GroundStation:
             self.budget.give_back(cost, is_proven=self.standing is Standing.PROVEN)
 
     def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
-        """Note a frame; returns its sender."""
+        """Note a frame; returns the sender."""
         self.is_back = now >= self.heard_at + _RETURNS_S
         self.is_heard, self.heard_at = True, now
         if self.version != 2:
@@ -349,7 +349,7 @@ class GroundStation:
     # Sending.
 
     def say(self, happening: Happening, *, is_routine: bool = False) -> None:
-        """Show a happening on this station; a refusal only once for each attempt.
+        """Show a happening on this station. A refusal only once for each attempt.
 
         `is_routine`: the program itself has made the request that was refused, and no pilot waits for the reason.
         """
@@ -374,7 +374,7 @@ class GroundStation:
             self.outbox.send(self, [question])
 
     def sent_sys_status(self, now: float, *, is_unhealthy: bool) -> None:
-        """Repeat bad news where the pilot can read it: right after a SYS_STATUS, it stays until the next one."""
+        """Repeat bad news where the pilot can read it: right after a SYS_STATUS, it stays until the next."""
         self.bad_news.is_replaced |= is_unhealthy
         self.say_again(now)
 

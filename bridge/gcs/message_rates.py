@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 
 #: Messages a second to all stations together, in equal shares: the defaults are 46 for each.
 _MOST_PER_S = 1200
-#: A station may get its share of this time in one burst.
+#: A station may get the share of this time in one burst.
 _BURST_S = 1.0
-#: A message due within this fraction of its interval is sent now, because the readings arrive at their own rate.
+#: A message due within this fraction of the interval is sent now, because the readings arrive at their own rate.
 _EARLY = 0.25
 
 
 class MessageRates:
     """One station's requests and schedule, by message id.
 
-    Each message uses some of its share; messages are sent while `used_until` is not more than a burst ahead.
+    Each message uses some of the share; messages are sent while `used_until` is not more than a burst ahead.
     """
 
     __slots__ = "due", "requested", "used_until"
@@ -33,7 +33,7 @@ class MessageRates:
         self.used_until = -inf
 
     def request(self, msgid: int, interval_s: float | None) -> None:
-        """Set the interval that the station requests; None: the default."""
+        """Set the interval that the station requests. Returns None if the default."""
         self.due.pop(msgid, None)
         if interval_s is None:
             self.requested.pop(msgid, None)

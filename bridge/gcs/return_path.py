@@ -20,7 +20,7 @@ _FACTOR = 3
 #: Small enough for both messages' fields, and for two trailing zeros that MAVLink 2 omits.
 _NONCES = 1 << 47
 _ROUND = 4
-#: A client may send a dozen requests before its answer arrives.
+#: A client may send a dozen requests before the answer arrives.
 _ENOUGH_QUESTIONS = 16
 #: The reason why frames of such a station are ignored.
 NOT_SHOWN = "behind a router, and answers no PING or TIMESYNC"
@@ -43,7 +43,7 @@ class ReturnPath:
         self._allowance += _FACTOR * size
 
     def allows(self, frame: bytes) -> bool:
-        """Count a frame to this address; False if it must not be sent."""
+        """Count a frame to this address. Returns False if it must not be sent."""
         is_allowed = len(frame) <= self._allowance
         self._allowance -= is_allowed * len(frame)
         return is_allowed

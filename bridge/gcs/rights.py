@@ -53,7 +53,7 @@ class FrameRefusal(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinkAccess:
-    """The conditions for writing over a link. `signing`: a signature with its key; `may_write`: the right address.
+    """The conditions for writing over a link. `signing`: a signature with the key. `may_write`: the right address.
 
     None: not required. Everything the bridge sends over a link with `signing` is signed; `link_id` is the link's number
     in the signature. `passes_everything`: without conditions, an autopilot that speaks MAVLink itself also gets
@@ -66,11 +66,11 @@ class LinkAccess:
     passes_everything: bool = False
 
     def signed_peer(self, peer: Peer) -> SignedPeer | None:
-        """The signatures of a peer; None if the link requires none."""
+        """The signatures of a peer, or None if the link requires none."""
         return None if self.signing is None else SignedPeer(self.signing, self.link_id, peer.host)
 
     def standing(self, peer: Peer, *, has_key: bool) -> Standing:
-        """The standing of a station; `has_key`: it has sent a valid signature."""
+        """The standing of a station. `has_key`: it has sent a valid signature."""
         if self.signing is None and self.may_write is None:
             return Standing.OPEN
         is_proven = (self.signing is None or has_key) and (self.may_write is None or self.may_write(peer))

@@ -2,7 +2,7 @@
 """Routes frames between an autopilot that speaks MAVLink itself and its ground stations, unchanged. Sans-IO.
 
 Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone
-except its sender; one with a target only to where that system (and component) was heard. Frames for a system that was
+except the sender; one with a target only to where that system (and component) was heard. Frames for a system that was
 not heard yet go to the autopilot.
 """
 
@@ -37,7 +37,7 @@ class Routes:
         self._heartbeats: set[bytes] = set()
 
     def from_autopilot(self, frames: Sequence[bytes], kinds: Sequence[bytes]) -> None:
-        """Send the autopilot's frames on; those that arrived together share datagrams unless one has a target."""
+        """Send the autopilot's frames on. Those that arrived together share datagrams unless one has a target."""
         if self._for_all.issuperset(kinds) or all(map(self._is_for_all, kinds, map(MavlinkFrame, frames))):
             self._send(frames)
             if not self._heartbeats.isdisjoint(kinds):
@@ -47,7 +47,7 @@ class Routes:
             self._send_alone(frame)
 
     def addressed(self, system: int, component: int = 0) -> tuple[int, int] | None:
-        """The ids on the autopilot's side of the component that a frame is for, or of its system; None: of neither."""
+        """The ids on the autopilot's side of the component that a frame is for, or of the system; None: of neither."""
         there = (ids for ids in self._aboard if system in (0, ids[0]))
         return min(there, key=lambda ids: (ids[1] != component, ids), default=None)
 
@@ -56,9 +56,9 @@ class Routes:
         return frame.sender in self._aboard
 
     def from_station(self, station: GroundStation, frame: MavlinkFrame, *, to_stations: bool) -> bool:
-        """Send an accepted frame on to other stations; True if it is also for the autopilot.
+        """Send an accepted frame on to other stations. Returns True if it is also for the autopilot.
 
-        `to_stations` False: it reaches no other station.
+        `to_stations` False: it does not reach other station.
         """
         system, component = frame.target
         there = self._ground.everyone if system == 0 else self._stations_of(system, component)
@@ -68,7 +68,7 @@ class Routes:
         return system == 0 or self.addressed(system) is not None or not others
 
     def _stations_of(self, system: int, component: int) -> list[GroundStation]:
-        """The stations with these ids. One that may only read is not found by its ids, which may be the pilot's."""
+        """The stations with these ids. One that may only read is not found by the ids, which may be the pilot's."""
 
         def is_there(station: GroundStation) -> bool:
             return any(sysid == system and component in (0, compid) for sysid, compid in station.senders)
@@ -76,7 +76,7 @@ class Routes:
         return [station for station in self._ground.everyone if station.rights.stations and is_there(station)]
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
-        """Meet a new kind of message from a component aboard; True if it has no target field."""
+        """Meet a new kind of message from a component aboard, or True if it has no target field."""
         if frame.has_target_field:
             return False
         self._aboard.add(frame.sender)

@@ -47,7 +47,7 @@ class Send:
     """Send a request frame. `reply_size`: the size of the whole reply frame, bytes, for the bound on pending replies.
 
     While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
-    `is_kept`: its reply goes into the link's LastReplies. `may_wait`: its reply may be read a few ms late.
+    `is_kept`: the reply goes into the link's LastReplies. `may_wait`: the reply may be read a few ms late.
     """
 
     frame: bytes
@@ -103,7 +103,7 @@ class Conclude:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Look up a list that was verified before. Answer: a RecalledMission; None: there was none."""
+    """Look up a list that was verified before. Answer: a RecalledMission. Returns None if there was none."""
 
     identity: ListIdentity
 
@@ -142,7 +142,7 @@ def send(frame: bytes, command: int, reply_payload: int, *, exclusive: bool = Fa
 def ask(
     frame: bytes, command: int, reply_payload: int, *, tries: int = 3, exclusive: bool = False, is_kept: bool = False
 ) -> Conversation[MspFrame | None]:
-    """Send a request and wait for its reply, with retries; None if none was answered."""
+    """Send a request and wait for the reply, with retries. Returns None if none was answered."""
     question = Send(frame, command, frame_size(command, reply_payload), exclusive, is_kept)
     for _ in range(tries):
         reply: MspFrame | None = yield Receive(frozenset((command,)), question)
@@ -154,11 +154,11 @@ def ask(
 def ask_surely(
     frame: bytes, command: int, reply_payload: int, *, stable: int | None = None
 ) -> Conversation[MspFrame | None]:
-    """Ask until two replies in a row are equal; None if they never are, or if a reply is missing.
+    """Ask until two replies in a row are equal. Returns None if they never are, or if a reply is missing.
 
     The 8-bit checksum misses some pairs of flipped bits: with one wrong bit in a thousand, one INFO reply in 500 and
     one BOXNAMES reply in 25 are damaged without notice. An error frame is a reply, too.
-    stable: compare only this many bytes of the payload, because the others may change; None: all.
+    stable: compare only this many bytes of the payload, because the others may change, or None if all.
     """
     before: MspFrame | None = None
     for _ in range(_MAX_ASKS):
@@ -170,13 +170,13 @@ def ask_surely(
 
 
 def ask_status(*, tries: int = 3) -> Conversation[StatusReport | None]:
-    """STATUS as of now, which telemetry may not show yet; None if it was not answered."""
+    """STATUS as of now, which telemetry may not show yet, or None if it was not answered."""
     reply = yield from ask(_STATUS, Msp.STATUS, STATUS_SIZE, tries=tries)
     return None if reply is None else decode_status(reply.payload)
 
 
 def ask_armed(arm_bit: int | None, *, tries: int = 3) -> Conversation[bool | None]:
-    """True if the board says now that it is armed; None if it does not answer. arm_bit: see FlightController."""
+    """True if the board says now that it is armed, or None if it does not answer. arm_bit: see FlightController."""
     status = yield from ask_status(tries=tries)
     return None if status is None or arm_bit is None else bool(status.box_flags >> arm_bit & 1)
 
@@ -197,13 +197,13 @@ def end_save() -> Conversation[int | None]:
 
 
 def conclude(number: int, outcome: Outcome, detail: str) -> Conversation[bool]:
-    """Store the outcome of a mission with one sentence; True if stored."""
+    """Store the outcome of a mission with one sentence. Returns True if stored."""
     done: bool | None = yield Conclude(number, outcome, detail)
     return bool(done)
 
 
 def recall(identity: ListIdentity) -> Conversation[RecalledMission | None]:
-    """A list that was verified before; None: there was none."""
+    """A list that was verified before, or None if there was none."""
     mission: RecalledMission | None = yield Recall(identity)
     return mission
 

@@ -38,7 +38,7 @@ _LINE_SILENCE_S = 0.05
 #: If at least this many bytes of polled replies are missing, the port is not read until they can have arrived, but for
 #: no longer than this.
 _LEAST_WAITED_FOR, _LONGEST_WAIT_S = 8, 0.02
-#: A board serves requests between two cycles of its control loop.
+#: A board serves requests between two cycles of the control loop.
 _SERVING_S = 0.004
 _ANY_SIZE = 1 << 16
 _NO_COMMAND = -1
@@ -62,7 +62,7 @@ _REPLY_SIZE, _MAY_WAIT = attrgetter("reply_size"), attrgetter("may_wait")
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
 #: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
-#: Harakiri answers with an error frame; a board that ignores unknown commands is never identified.
+#: Harakiri answers with an error frame. A board that ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 
 #: Constant while the same board is connected: API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, IDENT,
@@ -73,7 +73,7 @@ _MOST_REPLIES = 256
 
 
 def byte_time_s(baud: int | None) -> float:
-    """A byte's time on a line, with its start and stop bits; 0 where the line has no speed."""
+    """A byte's time on a line, with the start and stop bits, or 0 where the line has no speed."""
     return 10 / baud if baud else 0.0
 
 
@@ -168,7 +168,7 @@ class _Request:
     deadline: float
     exclusive: bool
     reply: _Reply = _Reply.AWAITED
-    #: The frame, if its reply is kept.
+    #: The frame, if the reply is kept.
     kept: bytes | None = None
     may_wait: bool = False
 
@@ -202,14 +202,14 @@ class MspLink:
             left_ring_at = now + owed * self.byte_s
             self._sent.append(_Request(_NO_COMMAND, owed, now, left_ring_at, exclusive=False, reply=_Reply.LOST))
         self._line_free_at = now
-        #: The smoothed time from a request's last byte on the wire to its reply.
+        #: The smoothed time from a request's last byte on the wire to the reply.
         self.round_trip_s = _FIRST_GUESS_S
         self._backoff = 1.0
         self._losses_in_a_row = 0
         self._resync_due = False
         self._last_byte_at = now
         self.last_heard_at = now
-        #: From the flight controller's INFO; 0 if its parser never gives up on a cut frame.
+        #: From the flight controller's INFO, or 0 if its parser never gives up on a cut frame.
         self.receiver_timeout_s = 0.0
         #: Set for boards that accept any byte inside a frame.
         self.any_byte = False
@@ -250,21 +250,21 @@ class MspLink:
         return 0 if self._waiting else self._room_in_ring()
 
     def send(self, message: Send, now: float) -> None:
-        """Send a request as soon as the flight controller has room for its reply."""
+        """Send a request as soon as the flight controller has room for the reply."""
         if not (self.any_byte or is_clean(message.frame)):
-            # Impossible by construction (protocols.msp.command_line); if it did happen, sending nothing is safe.
+            # Impossible by construction (protocols.msp.command_line). If it did happen, sending nothing is safe.
             raise AssertionError(f"frame with a hazard byte: {message.frame.hex()}")
         self._waiting.append(message)
         self._flush(now)
 
     def receive(self, data: bytes, now: float) -> list[MspFrame]:
-        """Take bytes from the port; return the replies, matched with their requests."""
+        """Take bytes from the port. Return the replies, matched with their requests."""
         self._last_byte_at = now
         frames = self.parser.feed(data)
         return self._take(frames, now) if frames else frames
 
     def tick(self, now: float) -> list[MspFrame]:
-        """Time out requests; return replies that a false header had hidden."""
+        """Time out requests. Return replies that a false header had hidden."""
         if now >= self._follow_up_at:
             self._ask(_QUESTION, now)
         if not self._sent or now < min(map(_DEADLINE, self._sent)):
@@ -297,7 +297,7 @@ class MspLink:
 
     @property
     def due(self) -> float:
-        """The time of the next `tick`; infinity while nothing is pending."""
+        """The time of the next `tick`, or infinity while nothing is pending."""
         return min(self._follow_up_at, *map(_DEADLINE, self._sent)) if self._sent else self._follow_up_at
 
     @property

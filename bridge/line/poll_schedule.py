@@ -2,9 +2,9 @@
 """The schedule of telemetry polls. Sans-IO.
 
 Each poll has a requested interval: the fastest that a ground station asked for or the bridge itself needs. The line
-may stretch it: requests and replies together get a share of its bytes, or of the board's time if that is scarcer
+may stretch it: requests and replies together get a share of the bytes, or of the board's time if that is scarcer
 (missions and commands have the rest), and lost replies slow all polls down until they arrive again. A poll is repeated
-only after its reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
+only after the reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -118,11 +118,11 @@ class _Slot:
 
     @property
     def backoff(self) -> float:
-        """The factor for its interval while it is not answered."""
+        """The factor for the interval while it is not answered."""
         return float(2 ** min(max(self.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS))
 
     def expect(self, reply_payload: int) -> None:
-        """Set its reply's payload, bytes. Its cost is that of both frames, or the board's time if that is longer."""
+        """Set the reply's payload, bytes. Its cost is that of both frames, or the board's time if that is longer."""
         self.reply_payload = reply_payload
         size = frame_size(self.poll.command, reply_payload)
         self.request = Send(self.poll.frame, self.poll.command, size, is_kept=True)
@@ -149,7 +149,7 @@ class _Slot:
             self.due = inf if self.interval_s == inf else self.asked_at + self.interval_s
 
     def may_be_asked_at(self, link: MspLink, room: int) -> float:
-        """When the link would take it; infinity if the link must change first."""
+        """When the link would take it, or infinity if the link must change first."""
         if self.is_asked and link.awaits(self.poll.command):
             return inf
         if self.request.reply_size <= room:
@@ -200,13 +200,13 @@ class PollSchedule:
         self._fit()
 
     def want(self, wanted: Mapping[Msp, float]) -> None:
-        """Set the requested intervals, seconds by command; the bridge's own needs are added."""
+        """Set the requested intervals, seconds by command. The bridge's own needs are added."""
         if wanted != self._wanted:
             self._wanted = wanted
             self._fit()
 
     def follow(self, command: int, frame: bytes, now: float) -> float | None:
-        """Poll for another program as long as it asks; None if this request is no poll.
+        """Poll for another program as long as it asks. Returns None if this request is not a poll.
 
         Returns the age up to which the last reply is current, seconds.
         """
@@ -221,16 +221,16 @@ class PollSchedule:
         return inf if slot.is_unknown else max(slot.interval_s, _CURRENT_S)
 
     def rest_s(self, size: int) -> float:
-        """The time in which the rest of the line carries a request and its reply, together `size` bytes."""
+        """The time in which the rest of the line carries a request and the reply, together `size` bytes."""
         return max(size, self._least_cost) / (self._budget / _LINE_SHARE - self._budget)
 
     def interval_s(self, command: Msp) -> float | None:
-        """The current interval of a poll, seconds; None if it is not polled."""
+        """The current interval of a poll, seconds, or None if it is not polled."""
         slot = self._slots.get(command)
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 
     def line_interval_s(self, command: Msp) -> float:
-        """The interval that the line's speed and missions on it allow, seconds; 0 if it is not polled."""
+        """The interval that the line's speed and missions on it allow, seconds, or 0 if it is not polled."""
         slot = self._slots.get(command)
         scale = self._line_scale * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
         return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale, backoff=1.0)
@@ -272,10 +272,10 @@ class PollSchedule:
             slot.set_interval(self._present_interval(slot))
 
     def due(self, link: MspLink) -> float:
-        """The time of the next request; infinity if a reply must arrive first."""
+        """The time of the next request, or infinity if a reply must arrive first."""
         earliest = min(map(_DUE, self._slots.values()), default=inf)
         if earliest > self._asked_at:
-            # Until then its previous reply will probably have arrived, and the link will have room.
+            # Until then the previous reply will probably have arrived, and the link will have room.
             return max(earliest, self._free_at)
         room = link.room
         earliest = inf
@@ -298,13 +298,13 @@ class PollSchedule:
             for slot in lost:
                 slot.is_asked = False
                 slot.misses += 1
-            # A poll that the board does not answer is no loss of the line, nor is another request.
+            # A poll that the board does not answer is not loss of the line, nor is another request.
             first = [slot for slot in lost if slot.misses == 1]
             self._quality = max(self._quality * _LOSS_FACTOR ** len(first), _WORST_QUALITY)
             self._beside_missions = beside_missions
             self._set_intervals()
             for slot in first:
-                slot.due = min(slot.due, now)  # asked again at once: a single loss makes no value stale
+                slot.due = min(slot.due, now)  # asked again at once: a single loss does not make a value stale
 
     def _followed(self) -> list[_Slot]:
         return [slot for slot in self._slots.values() if slot.followed_until > -inf and not slot.is_unknown]

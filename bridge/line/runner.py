@@ -58,7 +58,7 @@ class _BegunSave:
 class Runner:
     """Runs conversations in the order they were started. Time is passed in.
 
-    `do` gets the effects for the store; each is answered with `store_answered`.
+    `do` gets the effects for the store. Each is answered with `store_answered`.
     """
 
     def __init__(self, do: Callable[[StoreEffect], object]) -> None:
@@ -70,7 +70,7 @@ class Runner:
         self._current: Task[Any] | None = None
         self._awaited: Receive | Pause | StoreEffect | EndSave | None = None
         self._begun: _BegunSave | None = None
-        #: The time of the next `tick`; infinity while nothing is awaited.
+        #: The time of the next `tick`, or infinity while nothing is awaited.
         self.due = inf
         self._busy = False
 
@@ -91,7 +91,7 @@ class Runner:
         *,
         in_background: bool = False,
     ) -> Task[T]:
-        """Queue a conversation; `on_done` gets its result, or the LinkLost that ended it, and the time."""
+        """Queue a conversation; `on_done` gets the result, or the LinkLost that ended it, and the time."""
         task = Task(conversation, on_done, in_background)
         self._queue.append(task)
         self._begin_next(now)
@@ -117,7 +117,7 @@ class Runner:
             self.advance(Stopped("the bridge is stopping"), now)
 
     def store_answered(self, effect: StoreEffect, answer: object, now: float) -> None:
-        """Pass on the store's reply to an effect; a reply after its timeout is ignored."""
+        """Pass on the store's reply to an effect. A reply after the timeout is ignored."""
         if self._begun is not None and effect is self._begun.save:
             self._begun.answers.append(answer)
             is_awaited = isinstance(self._awaited, EndSave)
@@ -149,7 +149,7 @@ class Runner:
         return self._current if isinstance(self._awaited, Receive | Pause) else None
 
     def _begin_next(self, now: float) -> None:
-        """Run the queue; a loop, because without a link every conversation may end at once."""
+        """Run the queue. A loop, because without a link every conversation may end at once."""
         while self._current is None and self._queue and not self._busy:
             self._current = self._queue.popleft()
             self._current.began_at = now

@@ -39,7 +39,7 @@ class Loading(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StoreReport:
-    """The flight controller's report on its mission store. `stored` None: not known without reading the list."""
+    """The flight controller's report on the mission store. `stored` None: not known without reading the list."""
 
     state: StoreState
     rules: MissionRules
@@ -75,7 +75,7 @@ LIST_IS_GONE = frozenset(
 
 
 class PushFailed(Exception):
-    """An attempt to write has failed; `is_final`: a retry would not help."""
+    """An attempt to write has failed. `is_final`: a retry would not help."""
 
     def __init__(self, failure: PushFailure, *, is_final: bool = True) -> None:
         super().__init__(failure.value.text)
@@ -98,7 +98,7 @@ PushProgress = Callable[[int], None]
 class FcMissionStore(ABC, Generic[RecordT]):
     """A flight controller that stores missions; by default only one, which only the bridge changes."""
 
-    #: True if its list can be read while the craft is armed.
+    #: True if the list can be read while the craft is armed.
     reads_armed: bool = False
     #: How often to ask `is_current`, s.
     watch_s: float = 1.0
@@ -107,7 +107,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
 
     @abstractmethod
     def report(self) -> Conversation[StoreReport | None]:
-        """Ask the flight controller; None if it does not answer."""
+        """Ask the flight controller. Returns None if it does not answer."""
 
     @abstractmethod
     def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
@@ -115,11 +115,11 @@ class FcMissionStore(ABC, Generic[RecordT]):
 
     @abstractmethod
     def pull(self) -> Conversation[tuple[RecordT, ...] | None]:
-        """Read the list and verify the reading; None if that fails."""
+        """Read the list and verify the reading. Returns None if that fails."""
 
     @abstractmethod
     def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it, home first; `sent_as`: remembered commands, by record number."""
+        """A list as a ground station reads it, home first. `sent_as`: remembered commands, by record number."""
 
     @abstractmethod
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
@@ -156,7 +156,7 @@ class FliesToItems(ABC):
 
     @abstractmethod
     def fly_to(self, records: Sequence[Any], number: int) -> Conversation[Refusal | None]:
-        """Make it fly to this record of its mission; None if it does."""
+        """Make it fly to this record of the mission. Returns None if it does."""
 
 
 #: The mission store of any flight controller.

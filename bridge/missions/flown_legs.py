@@ -25,7 +25,7 @@ class Point(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """place: of the record; None: of the list. field: of its item. news: None if the list is rejected for it."""
+    """place: of the record; None: of the list. field: of the item. news: None if the list is rejected for it."""
 
     place: int | None
     field: str
@@ -37,7 +37,7 @@ class Departure:
     """Where the flight begins, `place`: that of the craft if known, else the home of the list.
 
     A craft that is kilometres away from `first`, the first place of the list, is taken to be carried to the list's home
-    if that is nearer. altitude_m: of the list's home above sea level; None if not given.
+    if that is nearer. altitude_m: of the list's home above sea level, or None if not given.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Departure:
 class Leg(NamedTuple):
     """One leg. target: the place in the list of the record flown to. cause: the same, or that of the JUMP before it.
 
-    start_cm, end_cm: heights above home; None if unknown. is_first: the way to the first record, of no length if the
+    start_cm, end_cm: heights above home, or None if unknown. is_first: the way to the first record, of no length if the
     departure is unknown. roi: the region of interest meanwhile.
     """
 

@@ -51,7 +51,7 @@ UNUSED = Range(0, 0, "not used")
 
 
 class ListCheck(ABC):
-    """The check of one list of `count` items, given in order; an item's number is its place in that order."""
+    """The check of one list of `count` items, given in order. An item's number is the place in that order."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -61,7 +61,7 @@ class ListCheck(ABC):
         self._verdict: Verdict[Any] | None = None
 
     def take(self, item: MissionItem) -> RejectingFinding | None:
-        """Check the next item; a rejection is final and is returned as soon as it is certain."""
+        """Check the next item. A rejection is final and is returned as soon as it is certain."""
         if self._rejection is None:
             item = replace(item, seq=self._taken)
             self._taken += 1
@@ -69,7 +69,7 @@ class ListCheck(ABC):
         return self._rejection
 
     def finish(self) -> Verdict[Any]:
-        """The verdict, after the rules for the kept list; ValueError if items are missing."""
+        """The verdict, after the rules for the kept list. Raises ValueError if items are missing."""
         if self._rejection is None and self._taken < self._count:
             raise ValueError(f"{self._taken} of {self._count} items taken")
         if self._verdict is None:
@@ -122,7 +122,7 @@ class ListCheck(ABC):
         self._note(item, name, value, value, why, News.WARNING)
 
     def _apply(self, judgements: Iterable[Judgement], sent: Sequence[MissionItem]) -> RejectingFinding | None:
-        """Report judgements on the flight; `sent`: the item of each record. The first that rejects ends it."""
+        """Report judgements on the flight. `sent`: the item of each record. The first that rejects ends it."""
         for place, field, why, news in judgements:
             if place is None and news is None:
                 return reject_list(MissionResult.INVALID, self._count, why)
@@ -142,7 +142,7 @@ class ListCheck(ABC):
                 self._note(item, name, value, 0, UNUSED.why, News.NONE)
 
     def _note_home(self, item: MissionItem) -> None:
-        """Item 0 is home. MAVSDK's `mission` plugin sends none, so its first waypoint becomes home.
+        """Item 0 is home. MAVSDK's `mission` plugin sends none, so the first waypoint becomes home.
 
         Mission Planner's "Write Fast" sends home in frame 3, too, but shows itself later (Upload.is_write_fast).
         """
@@ -159,7 +159,7 @@ class ListCheck(ABC):
 class HomeOnly(ListCheck):
     """The check of a list of one item: not a mission, but some clients clear with it.
 
-    MAVSDK clears an ARDUPILOTMEGA vehicle with one item of zeros; Mission Planner's empty Write sends home.
+    MAVSDK clears an ARDUPILOTMEGA vehicle with one item of zeros. Mission Planner's empty Write sends home.
     """
 
     def _judge(self, item: MissionItem) -> RejectingFinding | None:
@@ -180,7 +180,7 @@ _HOME_ONLY = reject_list(MissionResult.INVALID, 1, "only a home point, no comman
 
 
 class MissionRules(Protocol):
-    """The mission rules of a flight controller: its limits, and the check of a list."""
+    """The mission rules of a flight controller: the limits, and the check of a list."""
 
     @property
     def max_items(self) -> int:
@@ -209,7 +209,7 @@ def begin_check(count: int, rules: MissionRules, fallback_home: tuple[int, int] 
 def check_list(
     items: Sequence[MissionItem], rules: MissionRules, fallback_home: tuple[int, int] | None = None
 ) -> Verdict[Any]:
-    """Check a whole list; an empty one clears the flight controller's.
+    """Check a whole list. An empty one clears the flight controller's.
 
     >>> from bridge.controllers.harakiri.check import HarakiriRules
     >>> items = [MissionItem(seq, 16, 3, 0, 0, 0, 0, 453_000_000, 84_000_000, 20.4) for seq in range(2)]
@@ -250,12 +250,12 @@ def refuse_position(item: MissionItem) -> RejectingFinding | None:
 
 
 def missing_coordinate(item: MissionItem) -> tuple[str, int | None] | None:
-    """The missing coordinate: its field name and the value in its place; None if both are given."""
+    """The missing coordinate: its field name and the value in its place, or None if both are given."""
     if item.lat_e7 and item.lon_e7:
         return None
     return ("lon_e7", item.lon_e7) if item.lat_e7 else ("lat_e7", item.lat_e7)
 
 
 def given(value: float | None) -> float | None:
-    """The value; None for NaN or an omitted coordinate, "not given"."""
+    """The value, or None for NaN or an omitted coordinate, "not given"."""
     return None if value is None or math.isnan(value) else value

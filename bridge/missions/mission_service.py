@@ -53,7 +53,7 @@ _ARMS_WITHIN_S = 15.0
 
 
 class TransferStep(Enum):
-    """The two halves of an upload; a push has only the second."""
+    """The two halves of an upload. A push has only the second."""
 
     RECEIVING = "receiving"
     WRITING = "writing"
@@ -74,7 +74,7 @@ class DeliveryResult:
     """The result of a mission. `number` is its number in the store, None if it could not be stored.
 
     `change`: makes the sentence for other ground stations about a change on the aircraft, from the name of the station
-    that caused it; None if there is no change.
+    that caused it, or None if there is no change.
     """
 
     ack: MissionResult
@@ -92,7 +92,7 @@ class HeldMission:
     """The flight controller's list, as last read.
 
     `sent_seqs`: the item numbers of each ground station that sent this list and has not read it since, by
-    Sender.identity; only of those that count otherwise than `items`.
+    Sender.identity. Only of those that count otherwise than `items`.
     """
 
     identity: ListIdentity
@@ -119,9 +119,9 @@ class MissionEnded:
 
 
 class MissionService:
-    """Holds the transfer lock, the current flight controller's mission store, and its list."""
+    """Holds the transfer lock, the current flight controller's mission store, and the list."""
 
-    #: MAV_MISSION_TYPE of its lists.
+    #: MAV_MISSION_TYPE of the lists.
     mission_type: int = 0
     #: The current flight controller stores such lists, or did until it was lost. Missions are always answered.
     are_stored: bool = True
@@ -154,7 +154,7 @@ class MissionService:
     def run(
         self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
     ) -> None:
-        """Run a conversation; `on_done` gets its result and the time. A lost line is also a refusal."""
+        """Run a conversation; `on_done` gets the result and the time. A lost line is also a refusal."""
 
         def done(result: T | Refusal | LinkLost, at: float) -> None:
             if isinstance(result, LinkLost):
@@ -164,7 +164,7 @@ class MissionService:
         self.runner.start(conversation, done, now)
 
     def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
-        """Switch to another flight controller, to none, or to another protocol of the same one."""
+        """Switch to another flight controller, to none, or to another protocol of the same."""
         self.fc_store = store
         if self.held is not None:
             self._former, self._former_until = self.held, now + _ARMS_WITHIN_S
@@ -206,7 +206,7 @@ class MissionService:
 
     @property
     def watch_s(self) -> float:
-        """How often MissionWatch asks `is_current`, s; infinity without a store."""
+        """How often MissionWatch asks `is_current`, s, or infinity without a store."""
         return inf if isinstance(self.fc_store, Refusal) else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
@@ -216,7 +216,7 @@ class MissionService:
         return self.fc_store.seq_of(known.records, number)
 
     def stopped(self, report: NavStatus) -> str:
-        """Why the craft has just left its mission, in one sentence; empty if it has not, or for no known reason."""
+        """Why the craft has just left the mission, in one sentence, or empty if it has not, or for no known reason."""
         was_flown, self._flies_mission = (
             self._flies_mission,
             report.mode == NavMode.MISSION and report.error != FINISHED,
@@ -235,7 +235,7 @@ class MissionService:
         return None if self._owner is None else OCCUPIED
 
     def acquire(self, owner: object) -> Refusal | None:
-        """Take the transfer lock; a refusal if another client has it."""
+        """Take the transfer lock. A refusal if another client has it."""
         if (refusal := self.occupied()) is None:
             self._owner = owner
         return refusal
@@ -363,7 +363,7 @@ class MissionService:
             self.writing = None
 
     def read_back(self) -> Conversation[HeldMission | Refusal]:
-        """The flight controller's list; a cached copy is used only if the checksum is the same.
+        """The flight controller's list. A cached copy is used only if the checksum is the same.
 
         After connecting or an interrupted push, the flight controller first loads its saved mission if it holds none.
         """
@@ -398,7 +398,7 @@ class MissionService:
         return held
 
     def shown(self) -> Conversation[HeldMission | Refusal]:
-        """The list for a reader; of an armed flight controller that cannot be read, as verified before arming."""
+        """The list for a reader. Of an armed flight controller that cannot be read, as verified before arming."""
         held = yield from self.read_back()
         if isinstance(held, Refusal) and self.vehicle.armed:
             return self._verified_before_arming() or (_UNKNOWN if held is ARMED else held)

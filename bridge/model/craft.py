@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The craft as plain data: its kind, its flight mode, its battery, and the memory of a flight."""
+"""The craft as plain data: the kind, its flight mode, the battery, and the memory of a flight."""
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass

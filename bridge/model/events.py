@@ -11,7 +11,7 @@ Level = Literal["debug", "info", "warning", "error"]
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 @dataclass(frozen=True, kw_only=True)
 class BridgeEvent:
-    """An event. Its log line has its name, its level, and its fields as facts, with the unit in the key.
+    """An event. The log line has its name, its level, and the fields as facts, with the unit in the key.
 
     >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
     {'why': 'no answer for 3 s', 'speed_baud': 115200, 'incident': 'link-3'}
@@ -210,7 +210,7 @@ class MissionChangedOnBoard(BridgeEvent):
 
 
 class SettingsRead(BridgeEvent):
-    """All settings were read, for the first time or with `changed` values; `left_out`: those with impossible names."""
+    """All settings were read, for the first time or with `changed` values. `left_out`: those with impossible names."""
 
     name_in_log = "settings.read"
     settings: int

@@ -35,8 +35,8 @@ class Outcome(Enum):
 
     PENDING = "PENDING"
     VERIFIED = "VERIFIED"  # the flight controller holds it, checksum read back
-    REJECTED = "REJECTED"  # by the rules; the flight controller was not touched
-    CANCELLED = "CANCELLED"  # by the ground station, or by its timeout
+    REJECTED = "REJECTED"  # by the rules. The flight controller was not touched
+    CANCELLED = "CANCELLED"  # by the ground station, or by the timeout
     FAILED = "FAILED"  # the flight controller refused it or was not reachable
 
 
@@ -107,13 +107,13 @@ class Download:
 
 @dataclass(slots=True)
 class TransferMemory:
-    """One station's running download, and the answer to its last upload, of one mission type."""
+    """One station's running download, and the answer to the last upload, of one mission type."""
 
     download: Download | None = None
     final_ack: FinalAck | None = None
 
 
-#: In these states the craft is at its record's place.
+#: In these states the craft is at the record's place.
 _THERE = frozenset((NavState.HOLD_TIMED, NavState.LAND_IN_PROGRESS, NavState.LANDED, NavState.HOVER_ABOVE_HOME))
 _REACHED = LEGS | {NavAction.RTH}
 
@@ -139,7 +139,7 @@ class Way:
 class FlightReport:
     """A report of a board that counts the records it has reached (Harakiri).
 
-    number: the record in flight, or at which the flight has stopped, from 1; 0: none. reached: the last one reached, in
+    number: the record in flight, or at which the flight has stopped, from 1; 0: none. reached: the last reached, in
     this flight or the one before. is_flown: the mission flies the craft. way, stage: None if not reported. why: the
     reason for a stop or a delay, for the pilot. summary: see FlightProgress, for the log.
     """
@@ -183,7 +183,7 @@ class MissionProgress:
         self._reached: int | None = None
 
     def take(self, report: NavStatus | FlightReport) -> Sequence[int]:
-        """Take one report; returns the records reached since the one before."""
+        """Take one report. Returns the records reached since the one before."""
         if isinstance(report, FlightReport):
             return self._take_flight(report)
         reached = self._take_status(report)

@@ -165,7 +165,7 @@ class SettingsChange:
 class SettingsState:
     """`seal`: a checksum of all settings as last read, 8 hexadecimal digits.
 
-    `change`: the last one made outside the bridge, while this board was connected; None: there was none.
+    `change`: the last made outside the bridge, while this board was connected, or None if there was none.
     """
 
     board: BoardId

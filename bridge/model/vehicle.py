@@ -3,7 +3,7 @@
 
 Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
 metrics. Units are SI, angles are in degrees. None means unknown. Values that arrive together are one reading with its
-arrival time, and `Vehicle.fresh` alone decides whether it is current; a lost link clears nothing.
+arrival time, and `Vehicle.fresh` alone decides whether it is current. A lost link clears nothing.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ STALE_S = 1.4
 _STANDING_M = 10.0
 #: A message is never delivered later than this.
 _LATE_S = 5.0
-#: After a longer silence on the ground the battery may be another one.
+#: After a longer silence on the ground the battery may be another.
 _SWAP_S = 10.0
 #: 2020: no GPS reports an earlier time.
 _EARLIEST_UNIX_S = 1_577_836_800
@@ -127,7 +127,7 @@ class Sticks(Reading):
 
 @dataclass(slots=True)
 class Switches(Reading):
-    """The aux channel positions that turn on each box, from MSP_BOX; `boxes`: their names."""
+    """The aux channel positions that turn on each box, from MSP_BOX. `boxes`: their names."""
 
     boxes: tuple[str, ...]
     activation: tuple[int, ...]
@@ -153,7 +153,7 @@ class FlightState(Reading):
 
 @dataclass(slots=True)
 class Mode(Reading):
-    """A FlightMode, or another autopilot's mode number. If made from several messages, heard_at is the oldest one's."""
+    """A FlightMode, or another autopilot's mode number. If made from several messages, heard_at is the oldest's."""
 
     mode: FlightMode | str
 
@@ -266,13 +266,13 @@ class Vehicle:
         self.is_home_settled = False
         #: As last heard, however long ago.
         self.armed: bool | None = None
-        #: When it was armed, or first heard armed; None unless armed.
+        #: When it was armed, or first heard armed, or None unless armed.
         self.armed_at: float | None = None
         #: True from `resume` until the craft is heard.
         self._is_resumed = False
 
     def memory(self, family: str, now: float) -> FlightMemory | None:
-        """The facts about an armed craft that a restarted bridge needs; None unless it is armed."""
+        """The facts about an armed craft that a restarted bridge needs, or None unless it is armed."""
         switches = self.last(Switches)
         if self.last(FlightState) is None or self.armed_at is None:
             return None
@@ -295,7 +295,7 @@ class Vehicle:
             self._readings[Switches] = Switches(memory.made_at, Source.MSP, memory.boxes, memory.activation)
 
     def hear_uptime(self, now: float, uptime_s: float) -> None:
-        """Take the flight controller's time since its start: if it started after the arming, that flight is over."""
+        """Take the flight controller's time since the start: if it started after the arming, that flight is over."""
         if self.armed_at is not None and now - uptime_s > self.armed_at + _LATE_S:
             self._end_flight()
 
@@ -308,12 +308,12 @@ class Vehicle:
 
     @property
     def flight_mode(self) -> FlightMode | None:
-        """The flight mode as last heard, however long ago; None for another autopilot's."""
+        """The flight mode as last heard, however long ago, or None for another autopilot's."""
         last = self.last(Mode)
         return last.mode if last is not None and isinstance(last.mode, FlightMode) else None
 
     def hear(self, reading: Reading) -> None:
-        """Store a reading in place of the previous one of its kind."""
+        """Store a reading in place of the previous one of the kind."""
         kind = type(reading)
         if isinstance(reading, FlightState) and reading.armed is not None:
             self._follow_arming(reading.armed, reading.heard_at)
@@ -364,7 +364,7 @@ class Vehicle:
             self.home = replace(self.home, altitude_m=altitude_m)
 
     def hear_gps_time(self, now: float, source: Source, unix_s: float) -> None:
-        """Take UTC by GPS, seconds since 1970. Without it an autopilot counts from its start, and INAV reports 0."""
+        """Take UTC by GPS, seconds since 1970. Without it an autopilot counts from the start, and INAV reports 0."""
         if unix_s > _EARLIEST_UNIX_S:
             self.hear(GpsTime(now, source, unix_s))
 
@@ -375,17 +375,17 @@ class Vehicle:
 
     @property
     def last_flight(self) -> FlightReport | None:
-        """The last report of a board that reports more on its mission than the record (Harakiri)."""
+        """The last report of a board that reports more on the mission than the record (Harakiri)."""
         leg = self.last(MissionLeg)
         return leg.report if leg is not None and isinstance(leg.report, FlightReport) else None
 
     def mission_flight(self, now: float) -> FlightReport | None:
-        """The same of a board that flies its mission now."""
+        """The same of a board that flies the mission now."""
         flight = None if self.fresh(MissionLeg, now) is None else self.last_flight
         return flight if flight is not None and flight.is_flown else None
 
     def home_or_position(self) -> Home | None:
-        """Home; before it is known, the current position, at the altitude of the launch."""
+        """Home. Before it is known, the current position, at the altitude of the launch."""
         position, height = self.last(GlobalPosition), self.last(Height)
         if self.home is not None or position is None:
             return self.home

@@ -26,9 +26,9 @@ from protocols.msp.frame import Direction, request
 from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
-#: After the board was found: its list is read first. A program that changes settings sends several requests.
+#: After the board was found: the list is read first. A program that changes settings sends several requests.
 _FIRST_S, _AFTER_CHANGE_S, _INTERVAL_S = 0.2, 5.0, 60.0
-#: While the line is needed for something else; and after a failure, doubled after each further one.
+#: While the line is needed for something else, and after a failure, doubled after each further one.
 _RETRY_S, _MOST_RETRY_S = 0.3, 60.0
 #: Names in the log of settings that have changed.
 _MOST_NAMED = 20
@@ -97,7 +97,7 @@ class BoardSettings:
         return self.known.freshness >= Freshness.CHANGED and self._session.vehicle.armed is False
 
     def obstacle(self) -> SettingRefusal | None:
-        """The reason why settings can be neither read nor changed now; None if they can."""
+        """The reason why settings can be neither read nor changed now, or None if they can."""
         armed = self._session.vehicle.armed
         if armed:
             return ARMED
@@ -110,7 +110,7 @@ class BoardSettings:
     # The board.
 
     def found(self, controller: FlightController | None, now: float) -> None:
-        """Follow another flight controller, or another protocol of the same; None: it was lost."""
+        """Follow another flight controller, or another protocol of the same, or None if it was lost."""
         opens = None if controller is None else controller.profile.settings
         self._controller = controller
         self._fc_settings = fc_settings = None if opens is None or controller is None else opens(controller)
@@ -151,7 +151,7 @@ class BoardSettings:
     def change(self, name: str, value: Value, on_done: OnDone, now: float, client: str = "") -> None:
         """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns.
 
-        The same request of a client that still waits is not repeated, and gets no answer of its own.
+        The same request of a client that still waits is not repeated, and does not get an answer of its own.
         """
         change = SettingChange(client, on_done, name=name, value=value)
         of_client = 0
@@ -375,7 +375,7 @@ def _identify(controller: FlightController) -> Conversation[BoardId]:
 
 
 def _up_to_pause(conversation: Conversation[SettingTable | None]) -> Conversation[SettingTable | Pause | None]:
-    """Go on with a conversation up to its next pause, or its end."""
+    """Go on with a conversation up to the next pause, or the end."""
     answer = None
     try:
         while not isinstance(effect := conversation.send(answer), Pause):

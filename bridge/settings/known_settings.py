@@ -55,7 +55,7 @@ class KnownSettings:
         #: Also of a board that is armed or lost since.
         self.table: SettingTable | None = None
         self.freshness = Freshness.UNREAD
-        #: The board that was found; None until it is identified.
+        #: The board that was found, or None until it is identified.
         self.board: BoardId | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
@@ -91,14 +91,14 @@ class KnownSettings:
             self._memory.keep(self.board, {})  # the daemon may end before the next reading
 
     def changed(self, settings: Sequence[BoardSetting]) -> SettingTable | None:
-        """The settings read back after a change through the bridge; returns the table if it has changed."""
+        """The settings read back after a change through the bridge. Returns the table if it has changed."""
         self.may_have_changed(Freshness.CHANGED)
         former = self.table or SettingTable()
         self.table = former.updated(*settings)
         return self.table if self.table.settings != former.settings else None
 
     def saved(self) -> None:
-        """The board has saved its settings. A firmware may correct some that contradict each other."""
+        """The board has saved the settings. A firmware may correct some that contradict each other."""
         self.unsaved.clear()
         self._occasion = Occasion.SAVED
         self.may_have_changed()
@@ -128,7 +128,7 @@ class KnownSettings:
         return ReadResult(changed, elsewhere, self._backup(self.board, values) if table.is_complete else None)
 
     def _backup(self, board: BoardId, values: Mapping[str, Value]) -> TakenBackup | None:
-        """With changes that are not saved yet it is no backup: a restart would lose them."""
+        """With changes that are not saved yet it is not a backup: a restart would lose them."""
         self.unsaved = {name: value for name, value in self.unsaved.items() if values.get(name) == value}
         if self.unsaved:
             return None

@@ -37,7 +37,7 @@ class PlannedChange:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """A setting that the restore cannot write. held: its value on the board; None: the board lacks it."""
+    """A setting that the restore cannot write. held: the value on the board, or None if the board lacks it."""
 
     name: str
     wanted: Value
@@ -47,7 +47,7 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class RestorePlan:
-    """notice: a warning; empty if there is nothing to warn of."""
+    """notice: a warning, or empty if there is nothing to warn of."""
 
     changes: tuple[PlannedChange, ...]
     left_out: tuple[LeftOut, ...]
@@ -87,7 +87,7 @@ def plan_restore(
 
 
 def _refusal(setting: BoardSetting, value: Value) -> str:
-    """The reason why the board would not take the value; empty if it would."""
+    """The reason why the board would not take the value, or empty if it would."""
     if setting.fixed:
         return setting.fixed
     if not setting.accepts(value):
@@ -135,7 +135,7 @@ class LocalSettings:
 
     @property
     def kind(self) -> str | None:
-        """The board's firmware and its version; None without a board."""
+        """The board's firmware and the version, or None without a board."""
         controller = self._session.state.controller
         return None if controller is None else controller.kind
 
@@ -153,7 +153,7 @@ class LocalSettings:
     ) -> None:
         """Compare settings with those of the board. source: see `plan_restore`.
 
-        is_checked: read the board's first, if it is disarmed; else they are compared as last read.
+        is_checked: read the board's first, if it is disarmed, else they are compared as last read.
         """
 
         def read(table: SettingTable | SettingRefusal, at: float) -> None:
@@ -189,7 +189,7 @@ class LocalSettings:
         self._go_on(_restore(self._settings, plan, client, progress), on_done, None, now)
 
     def _go_on(self, steps: "_Steps", on_done: OnRestored, answer: object, now: float) -> None:
-        """Take the next step; each goes on with its answer."""
+        """Take the next step. Each goes on with the answer."""
         try:
             step = steps.send(answer)
         except StopIteration as end:
@@ -224,7 +224,7 @@ def _restore(settings: BoardSettings, make_plan: _Step, client: str, progress: C
         return ended(f"Nothing saved: {why}. {written} ({names}): {go_back}")
 
     def missed(table: SettingTable | SettingRefusal) -> str:
-        """The settings that the board does not hold as planned; empty if it holds all."""
+        """The settings that the board does not hold as planned, or empty if it holds all."""
         known = {} if isinstance(table, SettingRefusal) else table.settings
         names = [
             each.name

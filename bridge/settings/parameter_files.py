@@ -38,7 +38,7 @@ class ParameterFiles:
             self._values, self._pack = values, encode_param_pack(values)
 
     def find(self, path: str) -> bytes | None:
-        """The content of a file; None if there is none of this path."""
+        """The content of a file, or None if there is none of this path."""
         files = {
             _PACK: lambda: self._pack,
             _GENERAL: self.general,

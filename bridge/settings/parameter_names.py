@@ -22,7 +22,7 @@ _VOWELS = frozenset("aeiou")
 
 
 def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Mapping[str, str]:
-    """Setting by parameter; the parameters are distinct and in upper case, and none of them is `taken`.
+    """Setting by parameter. The parameters are distinct and in upper case, and none of them is `taken`.
 
     >>> parameter_names(["p_roll", "gps_ph_settlespeed"])
     {'P_ROLL': 'p_roll', 'GPS_PH_STTLSPD': 'gps_ph_settlespeed'}

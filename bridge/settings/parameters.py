@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink parameters: the bridge's own, and every setting of the flight controller. Values are REAL32, as ArduPilot's.
 
-Names are in upper case, as MAVProxy and DroneKit send all names; a name is recognised in any case.
+Names are in upper case, as MAVProxy and DroneKit send all names. A name is recognised in any case.
 
 https://mavlink.io/en/services/parameter.html
 
@@ -40,7 +40,7 @@ SYSID = "SYSID_THISMAV"
 _STICKS = ("ROLL", "PITCH", "THROTTLE", "YAW")
 #: The range of MSP's channels, us. ArduPilot's defaults (1100, 1900, 1500) would mean that nothing is calibrated.
 _CALIBRATION = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0}
-#: No board reports its sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
+#: No board reports the sensors' offsets in ArduPilot's units, so a value other than 0 only means "calibrated".
 _ACCELEROMETER_OFFSET_M_S2, _COMPASS_OFFSET_MG = 0.001, 1.0
 #: Not known, or set by `values`.
 _ZERO = (
@@ -49,7 +49,7 @@ _ZERO = (
 )  # fmt: skip
 #: INAV's reasons not to arm.
 _NO_ACCELEROMETER, _NO_COMPASS = ARMING_BLOCKERS[13], ARMING_BLOCKERS[12]
-#: Mission Planner's name for the radius in its plan screen, in cm; and a Harakiri's setting.
+#: Mission Planner's name for the radius in its plan screen, in cm, and a Harakiri's setting.
 WP_RADIUS, _RADIUS = "WPNAV_RADIUS", "GPS_WP_RADIUS"
 #: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.
 _EACH, _INTERVAL_S = 10, 0.02
@@ -73,7 +73,7 @@ class OwnParameters:
         for channel, stick in enumerate(_STICKS, 1):
             self._constant[f"RCMAP_{stick}"] = float(channel)
             self._constant |= {f"RC{channel}_{kind}": value for kind, value in _CALIBRATION.items()}
-        # Without an id QGroundControl makes no demands on the compass. No board needs it for arming.
+        # Without an id QGroundControl does not make demands on the compass. No board needs it for arming.
         self._constant |= dict.fromkeys(_ZERO, 0.0)
 
     def values(self) -> dict[str, float]:
@@ -123,7 +123,7 @@ class Parameters:
         self._told: dict[str, float] = {}
         self._files = ParameterFiles()
         self._dialogues: WeakKeyDictionary[Sender, _Dialogue] = WeakKeyDictionary()
-        #: The time of the next `tick`; infinity while no list is sent.
+        #: The time of the next `tick`, or infinity while no list is sent.
         self.due = inf
         #: True if the last PARAM_SET was refused: Mission Planner then asks for a save all the same.
         self.was_refused = False
@@ -199,7 +199,7 @@ class Parameters:
         self.was_refused = True
         cause = Cause.ARMED if refused is None else refused.cause
         if refused is not None:
-            # Each Write in Mission Planner sends its default radius of 30 m if its plan screen was open first.
+            # Each Write in Mission Planner sends the default radius of 30 m if its plan screen was open first.
             is_routine = name.upper() == WP_RADIUS and cause is Cause.OUT_OF_RANGE
             sender.say(Happening(sentences.RADIUS_KEPT, refused.why.values) if is_routine else refused.why)
         if name.upper() in self._values():
@@ -219,7 +219,7 @@ class Parameters:
             sender.to(messages.MAVLink_file_transfer_protocol_message(0, sender.sysid, sender.compid, answer))
 
     def metadata(self, uptime_ms: int) -> Message | None:
-        """COMPONENT_METADATA, which names the file with the descriptions; None before the settings are known."""
+        """COMPONENT_METADATA, which names the file with the descriptions, or None before the settings are known."""
         if not self._described():
             return None
         self._files.show(self._values(), self._described())

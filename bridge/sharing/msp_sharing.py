@@ -61,13 +61,13 @@ class MspSharing:
     _programs: deque[Program] = field(default_factory=deque)  # the next one to have a request forwarded first
     _total: TokenBucket = field(default_factory=partial(TokenBucket, _TOTAL))
     _forwarded: WaitingRequest | None = None
-    #: When the line has carried the last forwarded request and its reply.
+    #: When the line has carried the last forwarded request and the reply.
     _free_at: float = 0.0
     _stopped: bool = False
     _refusals: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     _losses: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     refused: Counter[str] = field(default_factory=Counter)
-    #: The time of the next `tick`; infinity while no request waits.
+    #: The time of the next `tick`, or infinity while no request waits.
     due: float = inf
 
     def join(self, program: Program) -> None:
@@ -164,7 +164,7 @@ class MspSharing:
             return
 
     def _obstacle(self) -> str:
-        """The reason why no request can be forwarded now; empty if it can."""
+        """The reason why no request can be forwarded now, or empty if it can."""
         state = self._session.state
         if state.link is None or state.controller is None:
             return "no flight controller speaks MSP now"
@@ -222,7 +222,7 @@ class MspSharing:
         self._disconnect(program, request)
 
     def _disconnect(self, program: Program, request: WaitingRequest) -> None:
-        """Without a connection, only this request gets no reply."""
+        """Without a connection, only this request does not get a reply."""
         program.waiting.remove(request)
         if program.close is not None:
             self._programs.remove(program)
@@ -230,7 +230,7 @@ class MspSharing:
             program.close()
 
     def _level(self, reports: TokenBucket, command: str, why: str, now: float) -> Level:
-        """Count a request that got no reply; the level of its log line."""
+        """Count a request that got no reply. The level of the log line."""
         self._count(f"{command}: {why}")
         return "warning" if reports.take(now) else "debug"
 
@@ -249,7 +249,7 @@ def _first_unknown(waiting: list[WaitingRequest]) -> WaitingRequest | None:
 
 
 def _carry(request: WaitingRequest, reply_size: int, arm_bit: int | None) -> Conversation[MspFrame | str]:
-    """Forward a request; its reply, or the reason for none. No poll may have reported yet that the craft was armed."""
+    """Forward a request. The reply, or the reason for none. No poll may have reported yet that the craft was armed."""
     command = request.frame.command
     if request.is_change:
         armed = yield from ask_armed(arm_bit)
@@ -275,7 +275,7 @@ def is_unknown_read(right: MspRight, frame: MspFrame) -> bool:
 
 
 def refusal(waiting: WaitingRequest, right: MspRight, link: MspLink, *, may_write: bool, armed: bool | None) -> str:
-    """The reason why a request is never forwarded; empty if it may be."""
+    """The reason why a request is never forwarded, or empty if it may be."""
     if right.effect is Effect.MOVE:
         return "never forwarded"
     if right.effect is Effect.UNKNOWN:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A program on a share: its budget and its waiting requests."""
+"""A program on a share: the budget and its waiting requests."""
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
@@ -39,7 +39,7 @@ class WaitingRequest:
 class Program:
     """A connected program. `name`: its address, `host`: the part of it without the port.
 
-    `send` carries a frame to it, `close` its connection; None over UDP, which has none. `may_write`: it may change
+    `send` carries a frame to it, `close` the connection, or None over UDP, which has none. `may_write`: it may change
     something on the flight controller.
     """
 
@@ -56,7 +56,7 @@ class Program:
         self._budget = TokenBucket(_LIMIT)
 
     def take(self, data: bytes, now: float) -> int | None:
-        """Queue the requests in `data`; the number that were parsed, None if all were dropped because of a flood."""
+        """Queue the requests in `data`. The number that were parsed, None if all were dropped because of a flood."""
         if not self._budget.has(now):
             return None
         if self.close is None:

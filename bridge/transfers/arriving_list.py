@@ -41,7 +41,7 @@ class WholeList:
 
 @dataclass(slots=True)
 class ItemRequest:
-    """The pending item request. Its timeout follows the ground station's round trip time."""
+    """The pending item request. The timeout follows the ground station's round trip time."""
 
     due: float = 0.0
     #: The item was requested more than once, and perhaps answered late.
@@ -78,7 +78,7 @@ class ItemRequest:
         """True if a repeated item was requested as often."""
         self._unanswered[seq] -= 1
         if self._unanswered[seq] == 0 and self._late[0] == seq:
-            # Every request was answered, so the first answer belonged to the first one.
+            # Every request was answered, so the first answer belonged to the first.
             self._round_trip_s = max(self._late[1], self._round_trip_s or 0.0)
         return self._unanswered[seq] >= 0
 
@@ -98,13 +98,13 @@ class ItemRequest:
 
 
 class ArrivingList:
-    """A list of `count` items; each is checked once all items before it are here.
+    """A list of `count` items. Each is checked once all items before it are here.
 
-    If one of its sender's frames was lost since the first item, that may have been the MISSION_COUNT of another list:
+    If one of the sender's frames was lost since the first item, that may have been the MISSION_COUNT of another list:
     most stations answer the request for an item of the previous list with one of their new list. So all items are
-    requested a second time before the last one, and after it if a frame was lost just before it. Mission Planner does
-    not go back, but it begins each list with item 0; its items that were not requested give it away: "Write Fast" sends
-    them in bursts, and "Write" repeats its present item if another one is requested.
+    requested a second time before the last, and after it if a frame was lost just before it. Mission Planner does
+    not go back, but it begins each list with item 0. The items that were not requested give it away: "Write Fast" sends
+    them in bursts, and "Write" repeats the present item if another is requested.
     """
 
     def __init__(self, count: int, check: ListCheck, now: float) -> None:
@@ -117,9 +117,9 @@ class ArrivingList:
         self.progress_at = now
         #: All items are of one list unless a frame after this one of their sender was lost.
         self._one_until = 0.0
-        #: Items 0.._compared-1 were the same the second time; None if they are not requested again.
+        #: Items 0.._compared-1 were the same the second time, or None if they are not requested again.
         self._compared: int | None = None
-        #: Items that arrived unrequested: new ones, or repeats of another one than requested a second time.
+        #: Items that arrived unrequested: new ones, or repeats of another than requested a second time.
         self._unrequested = 0
 
     @property
@@ -134,7 +134,7 @@ class ArrivingList:
         """The number of the item that is requested after a timeout.
 
         Not item 1: Mission Planner takes that request as the answer to the MISSION_COUNT of another list, and its
-        repeat as that to its item 0, which may be lost.
+        repeat as that to the item 0, which may be lost.
         """
         wanted = self._judged if self._compared is None else self._compared
         if self._judged == 1:
@@ -144,7 +144,7 @@ class ArrivingList:
         return wanted
 
     def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | Reply | int:
-        """Keep an item of this list; the number of the item that is requested next.
+        """Keep an item of this list. The number of the item that is requested next.
 
         An item that contradicts the list shows that its station has started again.
         """

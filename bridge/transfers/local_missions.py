@@ -55,7 +55,7 @@ class LocalMissions:
         *,
         may_erase: bool = True,
     ) -> None:
-        """Write a list; an empty one clears the flight controller's. `on_progress` gets the number of records written.
+        """Write a list. An empty one clears the flight controller's. `on_progress` gets the number of records written.
 
         `may_erase` False: a list without a storable item is refused.
         """

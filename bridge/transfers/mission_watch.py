@@ -14,7 +14,7 @@ from bridge.voice.happening import Happening
 
 
 class MissionWatch:
-    """Checks at the store's interval while no transfer runs; after a check that took longer, at once."""
+    """Checks at the store's interval while no transfer runs. After a check that took longer, at once."""
 
     def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions
@@ -23,7 +23,7 @@ class MissionWatch:
         self._has_asked_store = False
         #: The mission store whose saved mission was last reported as not loaded.
         self._unloaded: object = None
-        #: When the running check began; None while none runs.
+        #: When the running check began, or None while none runs.
         self._began_at: float | None = None
         #: The time of the next `tick`. A flight controller that was just found is checked at once.
         self.due = inf
@@ -53,7 +53,7 @@ class MissionWatch:
         return not (is_known and (yield from self._missions.fc_store.is_current()))
 
     def _catch_up(self) -> Conversation[Happening | None]:
-        """Read the list; returns the text for the pilot if it is another one."""
+        """Read the list. Returns the text for the pilot if it is another."""
         is_first, before = not self._missions.is_settled, self._missions.held
         held = yield from self._missions.read_back()
         if held is NO_LINK:
@@ -76,7 +76,7 @@ class MissionWatch:
         return sentences.CHANGED_ON_BOARD(held.identity.count)
 
     def _settle(self, held: HeldMission) -> Conversation[Happening | None]:
-        """Conclude the pending missions by the list found; returns the text about the newest for the pilot."""
+        """Conclude the pending missions by the list found. Returns the text about the newest for the pilot."""
         news = None
         pending, self._missions.pending = self._missions.pending, []
         for mission in pending:

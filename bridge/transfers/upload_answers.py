@@ -14,7 +14,7 @@ from bridge.voice.stations import Kind
 from protocols.mission_item import MissionResult
 from reports.verdict import Result, Verdict
 
-#: Mission Planner sends its last item for 5 s, its Cancel for 2.8 s.
+#: Mission Planner sends the last item for 5 s, its Cancel for 2.8 s.
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
 #: These never ask for the final ack again, so it is sent four times. Not later: QGroundControl's user takes 0.1 s to
@@ -28,7 +28,7 @@ _UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, sentences.UNKNOWN_U
 
 
 class UploadAnswers:
-    """Answers ground stations; each one's last answer is remembered for 10 s."""
+    """Answers ground stations. Each one's last answer is remembered for 10 s."""
 
     def __init__(self, ground: Ground, mission_type: int = 0) -> None:
         self._ground = ground
@@ -37,7 +37,7 @@ class UploadAnswers:
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
         self._again: list[tuple[Sender, FinalAck]] = []
-        #: The time of the next `tick`; infinity if nothing is to be sent later.
+        #: The time of the next `tick`, or infinity if nothing is to be sent later.
         self.due = inf
 
     # At the end of an upload.
@@ -53,7 +53,7 @@ class UploadAnswers:
         is_cancelled: bool = False,
         is_repeated: bool = False,
     ) -> None:
-        """Send the final MISSION_ACK of an upload of `count` items; 0 for a clear.
+        """Send the final MISSION_ACK of an upload of `count` items, or 0 for a clear.
 
         A Cancel after a refusal, or after one that came too late (`is_cancelled`), gets the same answer: it must not
         clear the mission. `is_repeated`: send it again until the station sends another mission message.
@@ -82,7 +82,7 @@ class UploadAnswers:
         for line in finding_lines(verdict.findings) if accepted else ():
             if line.text != delivery.text:
                 sender.say(line)
-        if delivery.number is None and not self._mission_type:  # the Pi stores no others
+        if delivery.number is None and not self._mission_type:  # the Pi does not store others
             sender.say(sentences.NOT_STORED_ON_PI())
         sender.say(delivery.why)
         if delivery.change is not None:
@@ -116,9 +116,9 @@ class UploadAnswers:
         return True
 
     def late_item(self, sender: Sender, seq: int, now: float, *, is_lost: bool) -> None:
-        """Answer an item of an upload that has ended; if `is_lost`, perhaps because the daemon was restarted.
+        """Answer an item of an upload that has ended. If `is_lost`, perhaps because the daemon was restarted.
 
-        A ground station whose address has just changed gets no answer.
+        A ground station whose address has just changed does not get an answer.
         """
         answer = self._last(sender, now)
         if answer is not None:

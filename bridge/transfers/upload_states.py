@@ -14,7 +14,7 @@ from bridge.transfers.arriving_list import ArrivingList, WholeList
 from bridge.voice import sentences
 from protocols.mission_item import MissionItem, MissionResult
 
-#: QGroundControl reports a failed write 1.5 s after its last item, unless that is requested again; MAVSDK after 2.5 s.
+#: QGroundControl reports a failed write 1.5 s after the last item, unless that is requested again; MAVSDK after 2.5 s.
 #: Writing 120 records to an INAV takes 2.4 s. Twice in that time, in case one request is lost.
 _NO_ANSWER_S = 0.6
 #: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
@@ -41,7 +41,7 @@ class Ready(Event):
 
 
 class SenderFinished(Event):
-    """The ground station considers its list written: "Write Fast" ends so even if items were lost."""
+    """The ground station considers the list written: "Write Fast" ends so even if items were lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class Ended(Event):
 
 
 class UploadState:
-    """A state ends at `deadline`, `seconds` after its start or last progress; `timeout` is then the answer."""
+    """A state ends at `deadline`, `seconds` after the start or last progress; `timeout` is then the answer."""
 
     seconds: float
     timeout: Refusal
@@ -159,7 +159,7 @@ class Closing(Receiving):
 
 
 class _Whole(UploadState):
-    """The whole list is here. Its last two items are requested again while the station waits for the final ack."""
+    """The whole list is here. The last two items are requested again while the station waits for the final ack."""
 
     is_awaited = True
 
@@ -177,12 +177,12 @@ class _Whole(UploadState):
 
     def repeats(self, now: float) -> tuple[int, ...]:
         self.item_repeated(now)
-        # MAVSDK allows five repeats; only a request for the item after the one before resets its count.
+        # MAVSDK allows five repeats. Only a request for the item after the one before resets its count.
         return tuple(range(max(self._count - 2, 0), self._count))
 
 
 class Complete(_Whole):
-    """The list has arrived, or it is a clear, and another one is being written."""
+    """The list has arrived, or it is a clear, and another is being written."""
 
     seconds = 2.5
     timeout = OCCUPIED
@@ -227,7 +227,7 @@ class Upload:
     mission_type: int
     heard_at: float
     number: int = 0
-    #: Its sender has ended it itself, with a MISSION_ACK: only Mission Planner's "Write Fast" does, and sends home.
+    #: The sender has ended it itself, with a MISSION_ACK: only Mission Planner's "Write Fast" does, and sends home.
     is_write_fast: bool = False
     #: The list is the board's own without some items.
     is_part: bool = False
@@ -241,7 +241,7 @@ class Fixed(Enum):
 
     #: The event cannot happen in this state: a bug.
     NEVER = auto()
-    #: The event changes nothing.
+    #: The event does not change anything.
     STAYS = auto()
     END = auto()
 

@@ -80,7 +80,7 @@ class MissionUploads:
         self._incidents = incidents
         self._queue = UploadQueue()
         self.answers = UploadAnswers(ground, missions.mission_type)
-        #: The time of the next `tick`; infinity if there is no upload, and no answer to repeat.
+        #: The time of the next `tick`, or infinity if there is no upload, and no answer to repeat.
         self.due = inf
         missions.on_released = self._wake
 
@@ -118,7 +118,7 @@ class MissionUploads:
             if upload.count:
                 self._handle(upload, Cancelled(), now)
         elif count != upload.count or state.received or isinstance(state, Delivering):
-            # Perhaps the same list, which its sender has also begun again.
+            # Perhaps the same list, which the sender has also begun again.
             self._handle(upload, _AGAIN, now)
             self._begin(sender, count, now)
         elif isinstance(state, Receiving):
@@ -161,7 +161,7 @@ class MissionUploads:
                 self.due = min(self.due, state.due)
 
     def ack(self, sender: Sender, result: int, now: float) -> None:
-        """MISSION_ACK from a ground station: an error cancels its upload, ACCEPTED ends "Write Fast"."""
+        """MISSION_ACK from a ground station: an error cancels the upload, ACCEPTED ends "Write Fast"."""
         upload = self._of(sender)
         if upload is None:
             return
@@ -187,7 +187,7 @@ class MissionUploads:
             self._handle(upload, Ended(refusal), now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
-        """A ground station's connection is closed: its uploads end without waiting for the timeout."""
+        """A ground station's connection is closed: the uploads end without waiting for the timeout."""
         for upload in self._queue.undelivered():
             if upload.sender.peer == peer:
                 self._handle(upload, Ended(_cancelled(sentences.DISCONNECTED())), now)
@@ -307,7 +307,7 @@ class MissionUploads:
         to.to(*map(make, seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
-        """Store the list and write it; a rejected one is only stored, unless its sender sent too many of them."""
+        """Store the list and write it. A rejected one is only stored, unless the sender sent too many of them."""
         is_kept = whole.verdict.result is not Result.REJECTED or upload.sender.station.allows(Cost.STORED)
         arrived = ArrivedMission(
             str(upload.sender), whole.items, whole.verdict, upload.sender.identity, lambda: upload.is_write_fast
@@ -340,7 +340,7 @@ class MissionUploads:
         )
 
     def _refuse(self, upload: Upload, refusal: Refusal, now: float) -> None:
-        """Report the reason for the end of an upload; the received items are still stored."""
+        """Report the reason for the end of an upload. The received items are still stored."""
         items = upload.state.received
         if items:
             finding = Finding(None, "list", len(items), None, refusal.text)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A calibration from its start to its result, in the words that Mission Planner and QGroundControl wait for. Sans-IO.
+"""A calibration from the start to the result, in the words that Mission Planner and QGroundControl wait for. Sans-IO.
 
 The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
 
-No firmware reports the result over MSP. A calibrated accelerometer reads a level craft; a Harakiri stores a compass
+No firmware reports the result over MSP. A calibrated accelerometer reads a level craft. A Harakiri stores a compass
 calibration and then restarts. A Harakiri does nothing else meanwhile, so its silence is not reported as a loss.
 """
 
@@ -37,9 +37,9 @@ _ACK_INTERVAL_S = 5.0
 #: Boards that stay reachable: MultiWii and its descendants collect compass values for 30 s, and accelerometer values
 #: for up to 2 s.
 _COMPASS_S, _ACCELEROMETER_S = 31.0, 4.0
-#: Harakiri collects 500 compass samples in a time that its owner sets: one to five minutes (sensors.c).
+#: Harakiri collects 500 compass samples in a time that the owner sets: one to five minutes (sensors.c).
 _FROZEN_COMPASS_S = 60.0
-#: A board that answers sooner has not calibrated its compass.
+#: A board that answers sooner has not calibrated the compass.
 _SHORTEST_COMPASS_S = 45.0
 #: Longer than any calibration, with the restart.
 _LONGEST_S = 360.0
@@ -104,7 +104,7 @@ class Calibration:
     _missions: MissionService
     _readiness: CraftReadiness
     _settings: BoardSettings
-    #: The time of the next `tick`; infinity while none runs.
+    #: The time of the next `tick`, or infinity while none runs.
     due: float = inf
     _action: FcAction | None = None
     #: The one that the flight controller is being asked for.
@@ -126,7 +126,7 @@ class Calibration:
             self._asked(sender, command, action, refused, now)
 
     def _start(self, sender: Sender, command: int, action: FcAction, now: float) -> ActionResult | None:
-        """Ask the flight controller; the reason if that cannot be done now."""
+        """Ask the flight controller. The reason if that cannot be done now."""
         controller = self._session.state.controller
         if controller is None or controller.arm_bit is None:
             # Without an arm flag it is unknown whether the craft is flying.
@@ -225,7 +225,7 @@ class Calibration:
             self._end("not level, or moved" if level is False else "no answer", now)
 
     def _end(self, failure: str, now: float) -> None:
-        """Report the result; `failure`: the reason, empty if it was successful."""
+        """Report the result. `failure`: the reason, empty if it was successful."""
         name = (self._action or CALIBRATE_ACCELEROMETER).name
         self._sender.say(sentences.NOT_CALIBRATED(name, failure) if failure else sentences.CALIBRATED(name))
         if self._command == m.MAV_CMD_DO_START_MAG_CAL:
@@ -258,7 +258,7 @@ class Calibration:
 
 
 def _is_level() -> Conversation[bool | None]:
-    """True if the accelerometer reads a level craft, as it does right after its calibration; None: no answer."""
+    """True if the accelerometer reads a level craft, as it does right after the calibration, or None without answer."""
     yield Pause(_SETTLED_S)
     forward = left = up = 0
     for _ in range(_LEVEL_CHECKS):

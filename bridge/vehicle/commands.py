@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """COMMAND_LONG and COMMAND_INT: every one is acknowledged (https://mavlink.io/en/services/command.html).
 
-No command may arm, steer or restart an aircraft; those that would are refused with a reason. The exception is
-DO_SET_MISSION_CURRENT on an INAV that flies its mission.
+No command may arm, steer or restart an aircraft. Those that would are refused with a reason. The exception is
+DO_SET_MISSION_CURRENT on an INAV that flies the mission.
 """
 
 import math
@@ -151,7 +151,7 @@ class CommandService:
             sender.say(of_mission or _REFUSED[command]())
 
     def _mission_refusal(self) -> Happening | None:
-        """The switch that flies the mission, or that none does; None if that is not known."""
+        """The switch that flies the mission, or that none does, or None if that is not known."""
         controller, vehicle = self._session.state.controller, self._session.vehicle
         if vehicle.last(MissionLeg) is None:
             is_asked = controller is not None and controller.profile.spoken is Spoken.MSP
@@ -260,7 +260,7 @@ def _msgid(param: float) -> int:
 
 
 def _action(command: int, params: Sequence[float]) -> FcAction | None:
-    """The flight controller action for a command; None if there is none.
+    """The flight controller action for a command, or None if there is none.
 
     MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, 2 for
     "level", 4 for "simple": these boards have one for all).

@@ -58,7 +58,7 @@ class Incoming:
         self.refused: Counter[tuple[str, str]] = Counter()
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:
-        """Handle bytes from a ground station; False if they are dropped. A datagram holds whole frames only."""
+        """Handle bytes from a ground station. Returns False if they are dropped. A datagram holds whole frames only."""
         received = self._ground.received(peer, data, now, datagram=datagram)
         if received is None:
             return False
@@ -96,7 +96,7 @@ class Incoming:
         return True
 
     def _ignore(self, why: str, station: GroundStation, frame: MavlinkFrame) -> None:
-        """Count and report a frame that gets no answer."""
+        """Count and report a frame that does not get an answer."""
         self.refused[station.peer.link, why] += 1
         # A station that is not heard is forgotten with each datagram.
         if station.is_heard or self.refused[station.peer.link, why] == 1:

@@ -131,7 +131,7 @@ class MessageRouter:
         }
 
     def take(self, sender: Sender, frame: MavlinkFrame, msgid: int, now: float) -> None:
-        """Handle a frame for the bridge's vehicle, if it is understood and its sender has not sent too many."""
+        """Handle a frame for the bridge's vehicle, if it is understood and the sender has not sent too many."""
         if msgid in _TOLD:
             # A joystick sends 50 a second: they must not use up the limit for answers.
             self._tell(sender, frame, msgid)

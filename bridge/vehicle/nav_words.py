@@ -8,7 +8,7 @@ from bridge.voice.happening import Sentence
 from bridge.voice.sentences import EMERGENCY, NAVIGATION
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 
-#: Legs may be shorter; the words of the last one are said.
+#: Legs may be shorter; the words of the last are said.
 _INTERVAL_S = 2.0
 #: With the current and the last item's number, as the ground station counts them.
 _EN_ROUTE, _HOLDING = "TO WP {}/{}", "HOLDING WP {}/{}"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The vehicle that ground stations see while the flight controller does not represent itself. Sans-IO.
 
-It exists from the start and keeps its ids, so when the craft arms and switches protocol, ground stations still see the
+It exists from the start and keeps the ids, so when the craft arms and switches protocol, ground stations still see the
 same vehicle.
 """
 
@@ -50,7 +50,7 @@ _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
 _HOME = (make.home_position, make.gps_global_origin)
 _POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
-#: A message, and the reading that triggers it; None: the clock.
+#: A message, and the reading that triggers it, or None if the clock.
 _Trigger = tuple[Row, type[Reading] | None]
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 _EXTENDED_SYS_STATE = _ROWS[messages.MAVLINK_MSG_ID_EXTENDED_SYS_STATE]
@@ -190,9 +190,9 @@ class OwnVehicle:
     # Requests of ground stations.
 
     def send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> bool | None:
-        """Send one message to a ground station; False: its values are unknown, None: no such message.
+        """Send one message to a ground station. Returns False if the values are unknown, None: no such message.
 
-        `index`: of the flight mode in AVAILABLE_MODES, from 1; 0: all.
+        `index`: of the flight mode in AVAILABLE_MODES, from 1, or 0 if all.
         """
         if msgid == messages.MAVLINK_MSG_ID_AVAILABLE_MODES:
             modes = make.available_modes(self._session.vehicle)
@@ -212,7 +212,7 @@ class OwnVehicle:
         return bool(made)
 
     def set_interval(self, station: GroundStation, msgid: int, interval_s: float | None) -> bool:
-        """Set the interval of a message for one ground station; None: the default. False: no such message."""
+        """Set the interval of a message for one ground station. Returns None if the default. False: no such message."""
         if msgid not in _ROWS:
             return False
         station.rates.request(msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
@@ -388,7 +388,7 @@ class OwnVehicle:
         return alike.items()
 
     def sent_seqs(self, station: GroundStation) -> SentSeqs:
-        """The item numbers of a station that sent the list and has not read it since; else ()."""
+        """The item numbers of a station that sent the list and has not read it since, else ()."""
         held = self._missions.on_board
         if held is None or not held.sent_seqs:
             return ()
@@ -396,7 +396,7 @@ class OwnVehicle:
         return next(filter(None, known), ())
 
     def _announce_home(self, now: float) -> None:
-        """Broadcast home whenever it changes; it can also be requested at any time."""
+        """Broadcast home whenever it changes. It can also be requested at any time."""
         home = self._session.vehicle.home
         if home == self._announced_home:
             return

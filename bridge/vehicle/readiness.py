@@ -4,7 +4,7 @@
 Heartbeat, SYS_STATUS, PreArm texts, refusals of transfers and commands, the status page and zenoh follow it.
 
 A craft that arms may change protocol and speed, and finding it again takes a second or two: such a silence changes no
-state. While SYS_STATUS has an unhealthy PREARM_CHECK, Mission Planner keeps the last PreArm text on its HUD.
+state. While SYS_STATUS has an unhealthy PREARM_CHECK, Mission Planner keeps the last PreArm text on the HUD.
 QGroundControl removes it after 35 s, and reads each out loud.
 """
 
@@ -35,7 +35,7 @@ _CALIBRATING = Refusal(MissionResult.DENIED, sentences.CALIBRATING_NOW())
 
 
 class ReadyState(Enum):
-    """system_status: of the heartbeat on the ground. why: the reason not to arm; empty if it may, or has its own."""
+    """system_status: of the heartbeat on the ground. why: the reason not to arm, or empty if it may, or has its own."""
 
     def __init__(self, title: str, system_status: int, may_arm: bool, why: str) -> None:
         self.title, self.system_status, self.may_arm, self.why = title, system_status, may_arm, why
@@ -51,7 +51,7 @@ class ReadyState(Enum):
 
 
 class CraftReadiness:
-    """Finds the state, and reports a loss, its end, a new flight controller, and the reasons not to arm.
+    """Finds the state, and reports a loss, the end, a new flight controller, and the reasons not to arm.
 
     `was_found`: before the bridge was restarted in flight. `is_wired`: not behind a Wi-Fi adapter.
     """

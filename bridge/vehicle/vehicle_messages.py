@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink messages of the vehicle that the bridge represents (docs/telemetry.md).
 
-An unknown or stale value is sent as MAVLink's "unknown"; a message whose fields have no such value is not made.
+An unknown or stale value is sent as MAVLink's "unknown". A message whose fields have no such value is not made.
 """
 
 import math
@@ -66,7 +66,7 @@ _CAPABILITIES = (
     | messages.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
 _NO_MISSION = 0xFFFF
-#: For firmware that reports no version: below 1.0 Mission Planner hides the choice of altitude frames.
+#: For firmware that does not report a version: below 1.0 Mission Planner hides the choice of altitude frames.
 _UNKNOWN_VERSION = (1, 0, 0)
 _OFFICIAL = 255
 _UNKNOWN_U16 = 0xFFFF
@@ -134,7 +134,7 @@ class Moment:
         return made
 
     def altitude_m(self) -> float | None:
-        """Above mean sea level, by GPS, as in all other sinks; without it home's altitude plus the height above it."""
+        """Above mean sea level, by GPS, as in all other sinks. Without it home's altitude plus the height above it."""
         home, height, position = self.vehicle.home, self.fresh(v.Height), self.fresh(v.GlobalPosition)
         if position is not None and position.altitude_m is not None:
             return position.altitude_m
@@ -204,7 +204,7 @@ def auto_mode(vehicle: v.Vehicle) -> int:
 
 
 def _standard_mode(vehicle: v.Vehicle, mode: FlightMode) -> int:
-    """MAV_STANDARD_MODE; only copters hold an altitude or a position, only aeroplanes cruise and are launched."""
+    """MAV_STANDARD_MODE. Only copters hold an altitude or a position, only aeroplanes cruise and are launched."""
     is_copter = vehicle.airframe not in (Airframe.FIXED_WING, *_ROVERS)
     is_plane = vehicle.airframe is Airframe.FIXED_WING
     of_one_kind = {
@@ -277,7 +277,7 @@ def global_position_int(at: Moment) -> Message:
         known(altitude_m)
         north_m_s, east_m_s = known(position.north_m_s), known(position.east_m_s)
     elif place is not None:
-        # A silent GPS is no lost fix.
+        # A silent GPS is not a lost fix.
         at.need(v.GpsFix)
     is_north_known = orientation is not None and orientation.is_north_known
     return messages.MAVLink_global_position_int_message(
@@ -320,7 +320,7 @@ def vfr_hud(at: Moment) -> Message:
 def sys_status(at: Moment) -> Message:
     """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads.
 
-    Only what is known is enabled: Mission Planner replaces the line on its HUD by the first enabled sensor that is not
+    Only what is known is enabled: Mission Planner replaces the line on the HUD by the first enabled sensor that is not
     healthy. A GPS without a 3D fix is not: to MAVSDK its bit means a good position.
     """
     health, fresh_health = at.vehicle.last(v.Health), at.fresh(v.Health)
@@ -345,7 +345,7 @@ def sys_status(at: Moment) -> Message:
         bad |= _PREARM
     enabled, healthy = present & ~unknown, present & ~unknown & ~bad
     if fresh_health is None:
-        # Readiness is shown while disarmed only. Without the bit QGroundControl would keep its last answer.
+        # Readiness is shown while disarmed only. Without the bit QGroundControl would keep the last answer.
         enabled, healthy = _MOTORS | (0 if at.vehicle.armed else _PREARM), healthy & _PREARM
     voltage, current, remaining = _battery(at)
     last_power = at.vehicle.last(v.Power)

@@ -33,7 +33,7 @@ from reports.vehicle_groups import (
 )
 
 #: The readings of each group, and their poll intervals while the group is watched, seconds. A group is published when
-#: its first reading arrives; when another one does, unless it was published just before; and when one becomes stale.
+#: the first reading arrives; when another does, unless it was published just before, and when one becomes stale.
 _SHOWS: Mapping[Group, Mapping[type[v.Reading], float]] = {
     Group.ATTITUDE: {v.Orientation: 0.1},
     Group.POSITION: {v.GlobalPosition: 0.2, v.Height: 0.2},
@@ -49,7 +49,7 @@ _NEWS_OF: Mapping[type[v.Reading], tuple[Group, float]] = {
     for group, readings in _SHOWS.items()
     for number, reading in enumerate(readings)
 }
-#: A reading is fresh up to and including its last moment.
+#: A reading is fresh up to and including the last moment.
 _SOON_S = 1e-3
 _FIXES = {v.Fix.NO_FIX: "none", v.Fix.TWO_D: "2D", v.Fix.THREE_D: "3D"}
 
@@ -117,7 +117,7 @@ class VehicleReporter:
         self._want(wanted)
 
     def group(self, group: Group, now: float) -> Any:
-        """The current values of a group: an instance of its class in reports.vehicle_groups."""
+        """The current values of a group: an instance of the class in reports.vehicle_groups."""
         self._session.settle_telemetry()
         return self._makers[group](now)
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sentence of the table, and a happening: a sentence with its values, which the bridge reports once."""
+"""A sentence of the table, and a happening: a sentence with the values, which the bridge reports once."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Generic, TypeVarTuple
 
-#: Mission Planner shows each piece of a longer STATUSTEXT alone, and on its HUD only the last one.
+#: Mission Planner shows each piece of a longer STATUSTEXT alone, and on the HUD only the last.
 LINE_LENGTH = 50
 #: A shortened name keeps this many characters.
 _LEAST_OF_NAME = 10
@@ -24,12 +24,12 @@ class Severity(IntEnum):
 
     @property
     def is_on_hud(self) -> bool:
-        """True if Mission Planner shows it on its HUD, and says it."""
+        """True if Mission Planner shows it on the HUD, and says it."""
         return self <= Severity.WARNING
 
 
 class Sentence(Generic[*Ts]):
-    """A row of the table, called with its values. `longest`: the longest values, which also declare the types.
+    """A row of the table, called with the values. `longest`: the longest values, which also declare the types.
 
     text: the whole sentence, for logs, commands and pages. short: the same for a HUD, where `text` may be too long.
     planner: the text that Mission Planner needs instead. lasts: bad news, which is repeated until the next Write.
@@ -57,7 +57,7 @@ class Sentence(Generic[*Ts]):
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """A sentence with its values. A HUD's line may shorten the first of them that is one word: a name."""
+    """A sentence with the values. A HUD's line may shorten the first of them that is one word: a name."""
 
     sentence: Sentence[*tuple[Any, ...]]
     values: tuple[Any, ...] = ()
@@ -97,7 +97,7 @@ class Happening:
 
 
 def shortened(name: str, room: int) -> str:
-    """A name in at most `room` characters, without its middle.
+    """A name in at most `room` characters, without the middle.
 
     >>> shortened("failsafe_off_delay_of_the_board", 16)
     'failsaf..e_board'

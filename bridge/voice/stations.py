@@ -4,7 +4,7 @@
 Mission Planner shows the last text of severity WARNING or worse for 10 s, or until a SYS_STATUS with an unhealthy
 sensor, and each piece of a longer text alone. QGroundControl (commit c15cc3204, Vehicle::_textMessageReceived) takes
 every text that begins with PreArm for a failure, and reads NOTICE and worse aloud. An ERROR is a banner over the map
-that hides the next one until the pilot closes it (_errorMessageReceived), beside the dialog by which it shows each
+that hides the next until the pilot closes it (_errorMessageReceived), beside the dialog by which it shows each
 refused command, mission transfer and parameter itself (showCommandAckError, _missionManagerError,
 ParameterManager::_mavlinkParamSet).
 """
@@ -52,7 +52,7 @@ class Kind(Enum):
 
 @dataclass(slots=True)
 class Behaviour:
-    """The messages by which a station shows what it is. compid: of its last sender. base_mode: in its heartbeat."""
+    """The messages by which a station shows what it is. compid: of the last sender. base_mode: in its heartbeat."""
 
     streams: bool = False
     commands: bool = False
@@ -71,7 +71,7 @@ class Behaviour:
 
 
 def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
-    """The texts for a kind of station, with their severities. On a HUD only the last one stays."""
+    """The texts for a kind of station, with their severities. On a HUD only the last stays."""
     sentence, severity, whole = happening.sentence, happening.severity, happening.text
     if kind is Kind.MISSION_PLANNER and sentence.planner:
         return [(severity, sentence.planner)]
@@ -87,7 +87,7 @@ def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
 
 
 def pieces(text: str, kind: Kind) -> list[str]:
-    """A text in pieces of 50 characters; the last one is shorter, which ends the text for clients that join pieces.
+    """A text in pieces of 50 characters. The last one is shorter, which ends the text for clients that join pieces.
 
     MAVSDK joins them without a separator. Others show each alone: they are split at spaces, and padded.
     """
@@ -141,7 +141,7 @@ class BadNews:
         return now < said_at + _ATTEMPT_S
 
     def said(self, happening: Happening, kind: Kind, now: float) -> Message | None:
-        """Note a refusal, or a sentence that lasts, which is being sent; returns the question to send with it."""
+        """Note a refusal, or a sentence that lasts, which is being sent. Returns the question to send with it."""
         if not happening.sentence.lasts and not kind.answers:
             return None
         news = _Open(happening, now)

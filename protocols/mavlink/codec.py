@@ -26,7 +26,7 @@ _HEADER_V2 = struct.Struct("<BBBBBBBHB")
 
 
 def decode(frame: MavlinkFrame) -> Message | None:
-    """The message in a frame; None if pymavlink does not know it.
+    """The message in a frame, or None if pymavlink does not know it.
 
     >>> heartbeat = decode(MavlinkFrame(bytes.fromhex("fe0900010100000000000203000403d014")))
     >>> heartbeat.get_type(), heartbeat.autopilot == messages.MAV_AUTOPILOT_ARDUPILOTMEGA
@@ -49,7 +49,7 @@ class Packed(NamedTuple):
 
 
 def repack(frame: MavlinkFrame) -> Packed | None:
-    """A received message, to be framed with other numbers; None if its size is not known."""
+    """A received message, to be framed with other numbers, or None if the size is not known."""
     form = MESSAGE_FORMATS.get(frame.msgid)
     if form is None:
         return None
@@ -143,12 +143,12 @@ class FrameWriter:
 
 
 def item_from_float_message(message: Message) -> MissionItem:
-    """Read MISSION_ITEM: its coordinates are float degrees."""
+    """Read MISSION_ITEM: the coordinates are float degrees."""
     return replace(item_from_int_message(message), lat_e7=degrees_to_e7(message.x), lon_e7=degrees_to_e7(message.y))
 
 
 def item_from_int_message(message: Message) -> MissionItem:
-    """Read MISSION_ITEM_INT: its coordinates are exact."""
+    """Read MISSION_ITEM_INT: the coordinates are exact."""
     params = (message.param1, message.param2, message.param3, message.param4)
     return MissionItem(message.seq, message.command, message.frame, *params, message.x, message.y, message.z)
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from pymavlink.dialects.v20 import all as messages
 
-#: A decoded or not yet packed message: its fields depend on its class.
+#: A decoded or not yet packed message: the fields depend on the class.
 Message: TypeAlias = Any
 _LAST_V1_ID = 255
 

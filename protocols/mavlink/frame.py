@@ -24,7 +24,7 @@ _AUTOPILOT, _NO_AUTOPILOT = 5, 8
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
-#: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes; its payload may be shorter than the message,
+#: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes; the payload may be shorter than the message,
 #: without trailing zeros, or longer, with newer extensions. MAVLink 1: by payload size and message id. It has no
 #: extensions, but pymavlink sends them anyway, and mavlink's C parser accepts them.
 _CRC_EXTRA_V2 = {msgid.to_bytes(3, "little"): bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
@@ -103,18 +103,18 @@ class MavlinkFrame:
 
     @property
     def is_signed(self) -> bool:
-        """True if a signature follows the CRC; it is not checked here."""
+        """True if a signature follows the CRC. It is not checked here."""
         return self.raw[0] == MAGIC_V2 and bool(self.raw[2] & _SIGNED)
 
     @property
     def payload(self) -> bytes:
-        """The message's bytes; MAVLink 2 omits trailing zeros."""
+        """The message's bytes. MAVLink 2 omits trailing zeros."""
         start = _HEADER_V2 if self.raw[0] == MAGIC_V2 else _HEADER_V1
         return self.raw[start : start + self.raw[1]]
 
 
 def kinds(frames: Iterable[bytes]) -> list[bytes]:
-    """The bytes of each whole frame's header that hold its sender and message id."""
+    """The bytes of each whole frame's header that hold the sender and message id."""
     return [frame[5:10] if frame[0] == MAGIC_V2 else frame[3:6] for frame in frames]
 
 

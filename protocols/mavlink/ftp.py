@@ -38,7 +38,7 @@ class FtpOp(IntEnum):
 
 
 class FtpSession:
-    """The one file that a ground station has open. `find`: the content of a path; None: there is none.
+    """The one file that a ground station has open. `find`: the content of a path, or None if there is none.
 
     The station chooses the session's number, mostly 0, because Mission Planner does not look at the one in the reply.
     """
@@ -102,7 +102,7 @@ def is_opening(payload: Sequence[int]) -> bool:
 
 
 def refuse(payload: Sequence[int]) -> list[int] | None:
-    """The payload of the NAK to a station without rights; None if it is not a request."""
+    """The payload of the NAK to a station without rights, or None if it is not a request."""
     return next(FtpSession(lambda _path: None).answer(payload), None)
 
 

@@ -36,7 +36,7 @@ def key_from_passphrase(passphrase: str) -> bytes:
 
 
 def ticks(unix_s: float) -> int:
-    """The signing timestamp of a Unix time in seconds; 0 before 2015."""
+    """The signing timestamp of a Unix time in seconds, or 0 before 2015."""
     return max(0, int((unix_s - EPOCH_UNIX_S) * TICKS_PER_S))
 
 
@@ -44,8 +44,8 @@ class Timestamps:
     """The timestamps of outgoing frames: the time, but strictly increasing even if the clock steps back.
 
     `clock` returns seconds since the Unix epoch. `at_least`: the last one of an earlier run. `newest`: the newest that
-    any peer with the key had; None: the next one is believed. `is_clock_set`: False while the clock may be weeks
-    behind, so that a peer's lead is no fault of the peer.
+    any peer with the key had, or None if the next one is believed. `is_clock_set`: False while the clock may be weeks
+    behind, so that a peer's lead is not a fault of the peer.
     """
 
     def __init__(
@@ -170,7 +170,7 @@ class Signing:
 class SignedPeer:
     """The other end of a link with a key.
 
-    It gets frames of its own time, if that is ahead: it would refuse those that are over a minute behind its clock.
+    It gets frames of its own time, if that is ahead: it would refuse those that are over a minute behind the clock.
     """
 
     def __init__(self, signing: Signing, link_id: int, host: Hashable) -> None:

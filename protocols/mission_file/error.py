@@ -39,9 +39,9 @@ def refuse_other_plans(commands: Iterable[int], name: str) -> None:
 
 
 def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
-    """Degrees * 1e7, None for NaN (not given); MissionFileError if out of range.
+    """Degrees * 1e7, None for NaN (not given). Raises MissionFileError if out of range.
 
-    The rules treat an infinite coordinate as missing, because a ground station may send it; in a file it is damage.
+    The rules treat an infinite coordinate as missing, because a ground station may send it. In a file it is damage.
     """
     e7 = degrees_to_e7(degrees)
     if e7 is None and not math.isnan(degrees):
@@ -74,7 +74,7 @@ _BINARY = (
     (re.compile(rb"\x1f\x8b|7z\xbc\xaf|Rar!"), "a compressed archive"),
     (re.compile(rb"%PDF"), "a PDF document"),
 )
-#: As much of a line as tells its kind: some of the patterns take quadratic time.
+#: As much of a line as tells the kind: some of the patterns take quadratic time.
 _LONGEST = 200
 #: By the first line that is not a comment.
 _TEXTS = (
@@ -92,7 +92,7 @@ _TEXTS = (
 
 
 def refuse_stranger(data: bytes, line: str, name: str) -> NoReturn:
-    """Refuse a file without a mission by its first bytes, or by the first line that is not a comment."""
+    """Refuse a file without a mission by the first bytes, or by the first line that is not a comment."""
     what = next((what for start, what in _BINARY if start.match(data)), "a binary file" if "\0" in line else None)
     if what is not None:
         raise MissionFileError(name, "", f"this is {what}", _SAVE_AS)

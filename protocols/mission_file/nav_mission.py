@@ -67,7 +67,7 @@ def read_wp_lines(text: str, name: str, note: Note) -> list[MissionItem]:
 
 
 def write_nav_xml(records: Sequence[NavRecord], home: tuple[int, int] | None) -> str:
-    """The records as INAV Configurator's and mwp's XML; `home`: degrees * 1e7."""
+    """The records as INAV Configurator's and mwp's XML. `home`: degrees * 1e7."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<mission>", '\t<version value="2.3-pre8"/>']
     if home is not None:
         lines.append(f'\t<mwp home-x="{home[1] / 1e7:.7f}" home-y="{home[0] / 1e7:.7f}"/>')

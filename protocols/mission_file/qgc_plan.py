@@ -92,7 +92,7 @@ def _other_parts(plan: dict[str, Any]) -> str:
 
 
 def write_qgc_plan(items: Sequence[MissionItem]) -> str:
-    """The items as a file's text, the first one as the planned home; `read_qgc_plan` reads the same again."""
+    """The items as a file's text, the first as the planned home; `read_qgc_plan` reads the same again."""
     home = [_degrees(items[0].lat_e7), _degrees(items[0].lon_e7), items[0].alt_m] if items else [0, 0, 0]
     mission = {
         "version": 2,
@@ -136,7 +136,7 @@ def _parse(text: str, name: str) -> Any:
 
 
 def _home(position: Any, name: str) -> MissionItem:
-    """Make item 0. An unknown ground level (null) is 0; a missing position is left to the rules."""
+    """Make item 0. An unknown ground level (null) is 0. A missing position is left to the rules."""
     where = "plannedHomePosition"
     coordinates = position if position is not None else []
     if not isinstance(coordinates, list) or len(coordinates) not in (0, 2, 3):

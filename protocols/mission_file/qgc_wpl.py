@@ -5,7 +5,7 @@ Version 120, as QGroundControl wrote it for PX4 from 2011 on, has the same field
 MAVLink 1: other numbers of commands, another order of fields (pymavlink's mavwp.py).
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
-autocontinue. Usually separated by tabs; any white space, commas and semicolons are accepted. Empty lines and lines that
+autocontinue. Usually separated by tabs. Any white space, commas and semicolons are accepted. Empty lines and lines that
 start with # are ignored. As in Mission Planner's reader these are fixed, with a note: items not numbered 0, 1, 2...,
 no home, home with command 0, no autocontinue.
 """

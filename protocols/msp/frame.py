@@ -2,7 +2,7 @@
 """MSP frames in both versions.
 
 v1, spoken by all: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). A reply of 255 bytes or
-more has the size 255, and its size in 16 bits after the command ("jumbo", INAV's msp_serial.c). v2, for INAV's commands
+more has the size 255, and the size in 16 bits after the command ("jumbo", INAV's msp_serial.c). v2, for INAV's commands
 above 255: `$X` direction flag command size payload crc, command and size 16 bits little-endian, DVB-S2's CRC of 8 bits.
 """
 
@@ -16,13 +16,13 @@ _START = b"$"
 _V1, _V2 = ord("M"), ord("X")
 _V2_HEADER = struct.Struct("<BHH")
 _V1_OVERHEAD, _JUMBO_OVERHEAD, _V2_OVERHEAD = 6, 8, 9
-#: Bytes of a v1 frame without its payload.
+#: Bytes of a v1 frame without the payload.
 FRAME_OVERHEAD = _V1_OVERHEAD
 _HIGHEST_V1_COMMAND = 0xFF
 #: The size of a jumbo frame's payload, where v1 has one byte for it.
 _JUMBO = 0xFF
 _MAX_REQUEST = 255
-#: INAV's largest reply, a block of its data flash. A header with a larger size is noise.
+#: INAV's largest reply, a block of the data flash. A header with a larger size is noise.
 MAX_REPLY = 4096 + 16
 
 
@@ -117,7 +117,7 @@ class MspParser:
         return len(self._buffer)
 
     def reset(self) -> list[MspFrame]:
-        """Drop an incomplete frame; return the frames found in its bytes."""
+        """Drop an incomplete frame. Return the frames found in its bytes."""
         frames: list[MspFrame] = []
         while self._buffer:
             self.skipped_bytes += 1
@@ -128,7 +128,7 @@ class MspParser:
 
 
 def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | None:
-    """The end of the frame at `start`; None if its header is incomplete, `start` if it is not a frame."""
+    """The end of the frame at `start`, or None if its header is incomplete, `start` if it is not a frame."""
     size = len(buffer) - start
     if not buffer.startswith(_HEADS, start):
         cut = bytes(buffer[start : start + _HEAD_SIZE])
@@ -153,7 +153,7 @@ def _frame_end(buffer: bytearray, start: int, *, takes_low_v2: bool) -> int | No
 
 
 def _decode(frame: bytearray) -> MspFrame | None:
-    """Decode a complete frame; None if its checksum is wrong."""
+    """Decode a complete frame. Returns None if the checksum is wrong."""
     direction = _DIRECTIONS[frame[2]]
     if frame[1] == _V1:
         payload_at = 7 if frame[3] == _JUMBO and direction is not Direction.REQUEST else 5

@@ -96,7 +96,7 @@ def decode_airspeed(payload: bytes) -> int | None:
 
 
 def decode_rtc(payload: bytes) -> float | None:
-    """Decode MSP_RTC: UTC, seconds since 1970, 0 until INAV has it from its GPS."""
+    """Decode MSP_RTC: UTC, seconds since 1970, 0 until INAV has it from the GPS."""
     if len(payload) < _RTC.size:
         return None
     seconds, millis = _RTC.unpack_from(payload)

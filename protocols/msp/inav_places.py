@@ -77,7 +77,7 @@ class Safehome(NamedTuple):
 
 
 class FenceAction(IntEnum):
-    """The action of a geozone at its border (navigation.h); a copter holds its position instead of avoiding it."""
+    """The action of a geozone at the border (navigation.h). A copter holds the position instead of avoiding it."""
 
     NONE = 0
     AVOID = 1
@@ -116,7 +116,7 @@ class Geozone:
 
     @property
     def vertices(self) -> int:
-        """As INAV counts: the second one of a circle is its radius."""
+        """As INAV counts: the second one of a circle is the radius."""
         return 2 if self.is_circle else len(self.corners)
 
     def pack(self) -> bytes:
@@ -189,7 +189,7 @@ def decode_geozone(payload: bytes) -> GeozoneHead | None:
 
 
 def decode_vertex(payload: bytes) -> tuple[Corner, int] | None:
-    """Read a reply: the place and, of a circle, its radius in cm."""
+    """Read a reply: the place and, of a circle, the radius in cm."""
     if len(payload) < _VERTEX.size:
         return None
     _, _, lat_e7, lon_e7 = _VERTEX.unpack_from(payload)

@@ -60,30 +60,30 @@ class InavSetting(NamedTuple):
         return _text(self.name) + details + texts + self.pack()
 
     def pack(self) -> bytes:
-        """The value as INAV sends it: a text fills its place."""
+        """The value as INAV sends it: a text fills the place."""
         packed = pack_value(self.type, self.value)
         return packed.ljust(self.maximum, b"\0") if self.type is InavType.STRING else packed
 
 
 def encode_about_index(index: int) -> bytes:
-    """The payload that names a setting by its place in the table."""
+    """The payload that names a setting by the place in the table."""
     return _INDEX.pack(0, index)
 
 
 def encode_about_name(name: str) -> bytes:
-    """The payload that names a setting; a new value may follow."""
+    """The payload that names a setting. A new value may follow."""
     return _text(name)
 
 
 def pack_value(kind: InavType, value: float | str) -> bytes:
-    """A value as COMMON_SET_SETTING takes it; struct.error for one that the type cannot hold."""
+    """A value as COMMON_SET_SETTING takes it. Raises struct.error for one that the type cannot hold."""
     if isinstance(value, str):
         return value.encode("ascii", "replace")
     return _VALUES[kind].pack(value if kind is InavType.FLOAT else int(value))
 
 
 def decode_setting_info(payload: bytes) -> InavSetting | None:
-    """Read a reply to COMMON_SETTING_INFO; None if it is truncated, or has an unknown type."""
+    """Read a reply to COMMON_SETTING_INFO. Returns None if it is truncated, or has an unknown type."""
     coded, rest = _take_text(payload)
     if not coded or rest is None or len(rest) < _DETAILS.size:
         return None
@@ -105,14 +105,14 @@ def decode_setting_info(payload: bytes) -> InavSetting | None:
     if value is None:
         return None
     if kind in (InavType.INT8, InavType.INT16, InavType.FLOAT):
-        # Sent as an unsigned number; the largest values of these types may be negative.
+        # Sent as an unsigned number. The largest values of these types may be negative.
         maximum = struct.unpack("<i", struct.pack("<I", maximum))[0]
     name = setting_name(coded)
     return InavSetting(name, group, InavType(kind), section, minimum, maximum, index, tuple(choices), value)
 
 
 def decode_value(kind: InavType, data: bytes) -> float | str | None:
-    """The value in a reply; None if it is truncated."""
+    """The value in a reply, or None if it is truncated."""
     if kind is InavType.STRING:
         return plain_text(data.partition(b"\0")[0])
     if len(data) < _VALUES[kind].size:
@@ -126,6 +126,6 @@ def _text(text: str) -> bytes:
 
 
 def _take_text(data: bytes) -> tuple[bytes, bytes | None]:
-    """A text and the bytes after it; None if its end is missing."""
+    """A text and the bytes after it, or None if the end is missing."""
     text, end, rest = data.partition(b"\0")
     return text, rest if end else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's mission extension: its records, requests and replies (docs/msp-mission.md)."""
+"""Harakiri's mission extension: the records, requests and replies (docs/msp-mission.md)."""
 
 import struct
 from collections.abc import Sequence
@@ -64,7 +64,7 @@ _INFO = struct.Struct("<BBBBBBHHIHHHI")
 #: Replies to BEGIN, CHUNK and COMMIT.
 _PROGRESS = struct.Struct("<BHI")
 _LIST = struct.Struct("<HI")
-#: Reply to READ, before the records: the first one's number.
+#: Reply to READ, before the records: the first's number.
 _SHORT = struct.Struct("<BH")
 
 #: Payload size of an INFO reply of version 1.
@@ -86,7 +86,7 @@ class WpCommand(IntEnum):
 
 
 class WpRecord(NamedTuple):
-    """One record, `wp_t` in mw.h; its number is its position in the list, record 0 is the home point.
+    """One record, `wp_t` in mw.h. Its number is the position in the list, record 0 is the home point.
 
     lat_e7, lon_e7: degrees * 1e7. height_m: above the launch point. roi_heading: 1 = nose to the region of interest.
     time: LOITER_TIME seconds 1..255, WAYPOINT 1 = brake. radius_m: hit radius. turns: LOITER_TURNS, negative CCW.
@@ -103,12 +103,12 @@ class WpRecord(NamedTuple):
     command: int
 
     def pack(self) -> bytes:
-        """The 16 bytes; struct.error if a field does not fit, which is a bug in the caller."""
+        """The 16 bytes. Raises struct.error if a field does not fit, which is a bug in the caller."""
         return _RECORD.pack(*self)
 
 
 def unpack_records(data: bytes) -> list[WpRecord]:
-    """Read every complete record in `data`; a shorter rest is ignored."""
+    """Read every complete record in `data`. A shorter rest is ignored."""
     whole = len(data) - len(data) % RECORD_SIZE
     return [WpRecord(*fields) for fields in _RECORD.iter_unpack(data[:whole])]
 
@@ -153,7 +153,7 @@ class Records(NamedTuple):
 
 
 def decode_info(payload: bytes) -> Info | None:
-    """Read an INFO reply; None if it is shorter than version 1 or makes no sense."""
+    """Read an INFO reply. Returns None if it is shorter than version 1 or does not make sense."""
     reply = _reply(_INFO, payload)
     if reply is None:
         return None
@@ -180,7 +180,7 @@ def decode_records(payload: bytes) -> Records | None:
 
 
 def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
-    """The status and the other fields; None if the payload is too short or the status unknown."""
+    """The status and the other fields, or None if the payload is too short or the status unknown."""
     if len(payload) < layout.size or payload[0] > _LAST_STATUS:
         return None
     status, *fields = layout.unpack_from(payload)
@@ -203,12 +203,12 @@ def find_mask(body: bytes, fixed_xor: int) -> int | None:
 
 
 def apply_mask(body: bytes, mask: int) -> bytes:
-    """XOR every byte of `body` with `mask`; the same call removes the mask."""
+    """XOR every byte of `body` with `mask`. The same call removes the mask."""
     return (int.from_bytes(body) ^ int.from_bytes(bytes((mask,)) * len(body))).to_bytes(len(body))
 
 
 def _masked_request(command: int, body: bytes) -> bytes | None:
-    """Encode a request with a masked body; None if its frame would hold a hazard byte with every mask."""
+    """Encode a request with a masked body. Returns None if its frame would hold a hazard byte with every mask."""
     size = len(body) + 1
     mask = find_mask(body, size ^ command)
     if mask is None:
@@ -226,7 +226,7 @@ def masked_request(command: int, body: bytes) -> bytes:
 
 
 def encode_begin(identity: ListIdentity) -> bytes:
-    """Encode BEGIN for a list; an empty one clears the stored list."""
+    """Encode BEGIN for a list. An empty one clears the stored list."""
     return masked_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
 
 

@@ -115,7 +115,7 @@ class FlightProgress:
 
 
 def decode_flight(payload: bytes) -> FlightProgress | None:
-    """Read a reply; None if it is truncated, an error, or of another version."""
+    """Read a reply. Returns None if it is truncated, an error, or of another version."""
     if len(payload) < _REPLY.size:
         return None
     status, version, flags, state, reason, _, record, reached, count, *motion = _REPLY.unpack_from(payload)
@@ -137,7 +137,7 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
 
 
 def decode_summary(summary: int) -> FlightProgress | None:
-    """Read SUMMARY: the rest is unknown, and left at its default; None if it is of another version."""
+    """Read SUMMARY: the rest is unknown, and left at the default. Returns None if it is of another version."""
     state, reason, flags, record = _SIGNED.pack(summary)
     progress = _progress(state, reason, flags)
     return None if progress is None else replace(progress, record=None if record == _NO_SHORT_RECORD else record)

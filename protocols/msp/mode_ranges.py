@@ -18,7 +18,7 @@ FORM = f"write AUX1 1300-1700 (several: with '; '), {_FIRST_US} to {_LAST_US} us
 
 
 def ranges_text(payload: bytes, number: int) -> str:
-    """The ranges of a mode in a reply to MODE_RANGES; empty if it has none."""
+    """The ranges of a mode in a reply to MODE_RANGES, or empty if it has none."""
     ranges = sorted(each[1:] for _, each in _slots(payload) if _is_of(each, number))
     return "; ".join(f"AUX{aux + 1} {_us(first)}-{_us(last)}" for aux, first, last in ranges)
 
@@ -56,7 +56,7 @@ def _slots(payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _is_of(held: bytes, number: int) -> bool:
-    """True if it is a range of this mode; an unused one has no width."""
+    """True if it is a range of this mode. An unused one has no width."""
     return held[0] == number and held[2] < held[3]
 
 

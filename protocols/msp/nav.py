@@ -2,7 +2,7 @@
 """Missions over MSP_SET_WP: the records and requests of INAV and MultiWii NAV (docs/inav.md).
 
 Records are numbered from 1. Numbers 0 and 255 are not part of a mission: writing them moves home, or a craft that
-holds its position, so no frame with them can be encoded here.
+holds the position, so no frame with them can be encoded here.
 """
 
 import struct
@@ -18,7 +18,7 @@ _STATUS = struct.Struct("<BBBBBH")
 WP_SIZE = _WP.size
 INFO_SIZE = _INFO.size
 NAV_STATUS_SIZE = _STATUS.size
-#: MSP_NAV_CONFIG in MultiWii 2.4, and its limits, after two bytes of flags and the waypoint radius.
+#: MSP_NAV_CONFIG in MultiWii 2.4, and the limits, after two bytes of flags and the waypoint radius.
 NAV_CONFIG_SIZE = 22
 _LIMITS_AT, _LIMITS = 2, struct.Struct("<HHH")
 _HIGHEST_NUMBER = 254
@@ -28,7 +28,7 @@ LAST, FLY_HOME = 0xA5, 0x48
 
 
 class Nav(IntEnum):
-    """Commands. SET_WP, LOAD and SAVE change the mission, the others change nothing."""
+    """Commands. SET_WP, LOAD and SAVE change the mission, the others do not change anything."""
 
     LOAD = 18
     SAVE = 19
@@ -67,7 +67,7 @@ class UnsafeRecord(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class NavRecord:
-    """One record; its number is its position in the list, counted from 1.
+    """One record. Its number is the position in the list, counted from 1.
 
     lat_e7, lon_e7: degrees * 1e7. alt_cm: above home, or above mean sea level if bit 0 of p3 is set. `flag` is LAST for
     the last record. `action` is a plain int because a flight controller may have an unknown number.
@@ -83,13 +83,13 @@ class NavRecord:
     flag: int = 0
 
     def pack(self) -> bytes:
-        """The 20 bytes after the number; struct.error if a field does not fit, which is a bug in the caller."""
+        """The 20 bytes after the number. Raises struct.error if a field does not fit, which is a bug in the caller."""
         return _BODY.pack(self.action, self.lat_e7, self.lon_e7, self.alt_cm, self.p1, self.p2, self.p3, self.flag)
 
 
 @dataclass(frozen=True, slots=True)
 class NavInfo:
-    """MSP_WP_GETINFO: the capacity, the validity of the current list, and its size."""
+    """MSP_WP_GETINFO: the capacity, the validity of the current list, and the size."""
 
     capacity: int
     is_valid: bool
@@ -178,7 +178,7 @@ LOAD_REQUEST = request(Nav.LOAD, b"\0")
 
 
 def encode_fly_to(number: int) -> bytes:
-    """The request that makes an INAV in waypoint mode fly to record `number` of its mission (INAV 9.1)."""
+    """The request that makes an INAV in waypoint mode fly to record `number` of the mission (INAV 9.1)."""
     return request(SET_WP_INDEX, bytes((number - 1,)))
 
 

@@ -28,7 +28,7 @@ def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
 def items_from_records(
     records: Sequence[NavRecord], home: MissionItem, sent_as: Mapping[int, int] = _NONE_KNOWN
 ) -> tuple[MissionItem, ...]:
-    """The items of a list; `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
+    """The items of a list. `sent_as`: a record's place (from 0) -> the MAV_CMD that it was sent as."""
     seqs = item_seqs(records)
     speeds = _shown_speeds(records)
     after = _speeds_after(records)
@@ -59,7 +59,7 @@ def sent_seqs(
 ) -> tuple[int | None, ...]:
     """The numbers as sent of the items that these records are read back as.
 
-    `record_seqs`: of the item that each record was made from; `speed_seqs`: of the changes of speed, ascending.
+    `record_seqs`: of the item that each record was made from. `speed_seqs`: of the changes of speed, ascending.
     """
     home_seq = 0
     sent: list[int | None] = [home_seq]
@@ -75,7 +75,7 @@ def sent_seqs(
 
 
 def _shown_speeds(records: Sequence[NavRecord]) -> dict[int, int]:
-    """The DO_CHANGE_SPEED before a record, by its place, for each record at which the speed changes on any path."""
+    """The DO_CHANGE_SPEED before a record, by the place, for each record at which the speed changes on any path."""
     after = _speeds_after(records)
     shown = {place: speed for place, speed in enumerate(after) if speed != (after[place - 1] if place else 0)}
     for place, record in enumerate(records):
@@ -91,7 +91,7 @@ def _speeds_after(records: Iterable[NavRecord]) -> list[int]:
 
 
 def _jump_target(record: NavRecord, count: int) -> int | None:
-    """The target place of a JUMP; None for other records and for invalid targets."""
+    """The target place of a JUMP, or None for other records and for invalid targets."""
     return record.p1 - 1 if record.action == NavAction.JUMP and 1 <= record.p1 <= count else None
 
 

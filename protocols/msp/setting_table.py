@@ -38,7 +38,7 @@ class SettingType(IntEnum):
 
 
 class Setting(NamedTuple):
-    """A setting as the board describes it; the limits are whole numbers for every type."""
+    """A setting as the board describes it. The limits are whole numbers for every type."""
 
     name: str
     type: SettingType
@@ -52,11 +52,11 @@ class Setting(NamedTuple):
 
     @property
     def identity(self) -> int:
-        """The hash that a request to set it must have, so that it reaches no other build's setting."""
+        """The hash that a request to set it must have, so that it does not reach other build's setting."""
         return crc32(self.description)
 
     def pack(self, value: float) -> bytes:
-        """The four bytes on the wire; struct.error for a value that the type cannot hold."""
+        """The four bytes on the wire. Raises struct.error for a value that the type cannot hold."""
         if self.type is SettingType.FLOAT:
             return struct.pack("<f", value)
         return struct.pack("<i" if self.type in (SettingType.INT8, SettingType.INT16) else "<I", int(value))
@@ -86,7 +86,7 @@ class SettingsReply(NamedTuple):
 
     @property
     def size(self) -> int:
-        """The size of its payload, bytes."""
+        """The size of the payload, bytes."""
         return _HEADER.size + sum(len(held.encode()) for held in self.settings)
 
 
@@ -116,12 +116,12 @@ def encode_set_setting(index: int, setting: Setting, value: float) -> bytes:
 
 
 def encode_save(checksum: int) -> bytes:
-    """Encode a save of the settings with this `table_checksum`; the board saves no others."""
+    """Encode a save of the settings with this `table_checksum`. The board does not save others."""
     return masked_request(SettingCommand.SET_SETTING, _SET.pack(WHOLE_TABLE, 0, checksum.to_bytes(4, "little")))
 
 
 def decode_settings(payload: bytes) -> SettingsReply | None:
-    """Read a reply with settings; None if it is truncated, or has an unknown status or type."""
+    """Read a reply with settings. Returns None if it is truncated, or has an unknown status or type."""
     if len(payload) < _HEADER.size or payload[0] > max(ReplyStatus):
         return None
     status, first = _HEADER.unpack_from(payload)
@@ -136,7 +136,7 @@ def decode_settings(payload: bytes) -> SettingsReply | None:
 
 
 def decode_table(payload: bytes) -> TableReply | None:
-    """Read a reply about all settings; None if it is another one."""
+    """Read a reply about all settings. Returns None if it is another."""
     if len(payload) < _TABLE.size or payload[0] > max(ReplyStatus):
         return None
     status, index, total, checksum = _TABLE.unpack_from(payload)

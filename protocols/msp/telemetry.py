@@ -72,7 +72,7 @@ class RawImu(NamedTuple):
 class RawGps(NamedTuple):
     """MSP_RAW_GPS: degrees * 1e7, metres above sea level, cm/s; course in 0.1 degrees and HDOP * 100 where sent.
 
-    `fix` is 0 or 1; INAV's is 0, 1 (two dimensions) or 2 (three).
+    `fix` is 0 or 1. INAV's is 0, 1 (two dimensions) or 2 (three).
     """
 
     fix: int
@@ -140,7 +140,7 @@ def decode_raw_gps(payload: bytes) -> RawGps | None:
 def decode_attitude(payload: bytes) -> tuple[int, int, int] | None:
     """Read MSP_ATTITUDE: roll and pitch in 0.1 degrees, heading in degrees.
 
-    Right wing down and nose down are positive on all firmware; Harakiri's and baseflight's heading is -180..180, the
+    Right wing down and nose down are positive on all firmware. Harakiri's and baseflight's heading is -180..180, the
     others' 0..360.
     """
     return _ATTITUDE.unpack_from(payload) if len(payload) >= _ATTITUDE.size else None

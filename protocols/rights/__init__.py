@@ -7,19 +7,19 @@ from enum import StrEnum
 class Effect(StrEnum):
     """An effect. The first four apply to MSP and MAVLink, the others to MAVLink only.
 
-    A mission's upload is a CHANGE; its start is a MOVE.
+    A mission's upload is a CHANGE. The start is a MOVE.
     """
 
     #: The flight controller replies and is otherwise as before.
     READ = "read"
-    #: Changes its settings, mission, calibration or memory.
+    #: Changes the settings, mission, calibration or memory.
     CHANGE = "change"
     #: Arms or moves the craft, restarts it, or replaces its transmitter, sensors, receiver or port.
     MOVE = "move"
     #: No firmware's handler is known for it.
     UNKNOWN = "unknown"
 
-    #: Part of a ground station's own dialogue. An autopilot knows the station only by its ids: with those of the pilot,
+    #: Part of a ground station's own dialogue. An autopilot knows the station only by the ids: with those of the pilot,
     #: a heartbeat hides the loss of the pilot's station, and a mission request ends the pilot's upload.
     DIALOGUE = "dialogue"
     #: Asks for message rates, which an autopilot applies to all ground stations.

@@ -104,7 +104,7 @@ MESSAGES: Mapping[int, Effect | FieldRule] = {
     m.MAVLINK_MSG_ID_HIL_RC_INPUTS_RAW: Effect.MOVE,
     m.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: Effect.MOVE,
     m.MAVLINK_MSG_ID_HIL_SENSOR: Effect.MOVE,
-    # An ArduPilot slows its telemetry down by the free space in a radio's buffer.
+    # An ArduPilot slows the telemetry down by the free space in a radio's buffer.
     m.MAVLINK_MSG_ID_RADIO_STATUS: Effect.SILENCE,
     m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: FieldRule(
         "dialogue if it reads or ends a session, move if it writes a file (a script)",

@@ -31,7 +31,7 @@ class Firmware(Enum):
 
 
 class MspRight(NamedTuple):
-    """The effect of a request. lengths: of its payload, bytes. reply: the largest payload of its reply.
+    """The effect of a request. lengths: of the payload, bytes. reply: the largest payload of the reply.
 
     only: the payloads with this effect, if not every one of these lengths has it. otherwise: the effect of the others.
     """
@@ -54,7 +54,7 @@ Rights = Mapping[int, MspRight]
 
 
 def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
-    """The right of a request; UNKNOWN for what no handler is known to take."""
+    """The right of a request, or UNKNOWN for what no handler is known to take."""
     right = MSP_RIGHTS[firmware].get(command)
     if right is None:
         names = (rights[command].name for rights in MSP_RIGHTS.values() if command in rights)
@@ -64,7 +64,7 @@ def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
 
 
 def _reads(**rows: tuple[int, ...]) -> Rights:
-    """NAME=(command, largest reply, *payload lengths); without lengths the request is empty."""
+    """NAME=(command, largest reply, *payload lengths). Without lengths the request is empty."""
     return {row[0]: MspRight(name, Effect.READ, row[2:] or (0,), row[1]) for name, row in rows.items()}
 
 
@@ -91,7 +91,7 @@ _LARGEST_ACK = 2
 #: The receive buffers: INBUF_SIZE, NM_BUFFER_SIZE, MSP_PORT_INBUF_SIZE.
 _BUFFER, _EXTENDED_BUFFER, _NEW_BUFFER = 64, 243, 192
 
-# -- Descendants of MultiWii with its buffer ---------------------------------------------------------------------------
+# -- Descendants of MultiWii with the buffer ---------------------------------------------------------------------------
 
 #: The first two are requested to distinguish these boards from newer ones: they answer with an error.
 _OLD_READS = _reads(
@@ -119,7 +119,7 @@ _HARAKIRI: Rights = {
     **_changes(_BUFFER, SET_BOX=(203, 28, 30, 56, 60), SET_MISC=(207, *range(_BUFFER + 1))),
     118: MspRight("WP", Effect.READ, (1,), 12, frozenset((b"\x00", b"\x10"))),
 }  # fmt: skip
-#: The extension takes a request only with its own length, and leaves its reply in the receive buffer.
+#: The extension takes a request only with its own length, and leaves the reply in the receive buffer.
 _HARAKIRI_MISSIONS: Rights = {
     **_HARAKIRI,
     **_reads(MISSION_INFO=(190, 24), MISSION_READ=(195, 243, 5), SETTING=(197, 218, 5), FLIGHT=(179, 26)),
@@ -129,7 +129,7 @@ _HARAKIRI_MISSIONS: Rights = {
         MISSION_ABORT=(194, 0), MISSION_RADIUS=(196, 5), SET_SETTING=(198, 11),
     ),
 }  # fmt: skip
-#: GPSSVINFO makes the board poll its GPS. SET_WP moves home or the place that the craft holds.
+#: GPSSVINFO makes the board poll the GPS. SET_WP moves home or the place that the craft holds.
 _BASEFLIGHT: Rights = {
     **_OLD_READS, **_OLD_MOVES, **_OLD_CHANGES,
     **_reads(
@@ -283,7 +283,7 @@ _INAV: Rights = {
 
 
 def _agreed(command: int, tables: Collection[Rights]) -> MspRight | None:
-    """The right of a request that is a read on every firmware with a handler for it; the others answer with an error.
+    """The right of a request that is a read on every firmware with a handler for it. The others answer with an error.
 
     A number that few of them use may be anything on a board that is none of them.
     """

@@ -44,7 +44,7 @@ _MOST_CONTROL = 1 << 20
 _FIND = "for boot in /boot/firmware /boot; do [ ! -e $boot/naze-bridge/{0} ] || exec sh $boot/naze-bridge/{0}; done"
 #: Once the folder is renamed, all is done; a power cut may have left a part of it.
 _CLEAN_UP = f"rm -rf /boot/firmware/{FOLDER}.done /boot/{FOLDER}.done; rm -f {_UNIT} {_LINK}"
-#: In firstrun.sh, where no network runs; the Imager's cmdline.txt restarts the Pi after it.
+#: In firstrun.sh, where no network runs. The Imager's cmdline.txt restarts the Pi after it.
 _IN_FIRSTRUN = f"({_FIND.format('enable.sh')})"
 #: In user-data, once the system is up.
 _IN_USER_DATA = "[sh, /boot/firmware/naze-bridge/enable.sh, start]"
@@ -138,7 +138,7 @@ def card(
     new_key: bool,
     key_file: Path | None,
 ) -> None:
-    """Prepare a card that Raspberry Pi Imager has just written; BOOT is its boot partition.
+    """Prepare a card that Raspberry Pi Imager has just written; BOOT is the boot partition.
 
     The first start installs the package, sets the bridge up and opens the hotspot, without a network or a terminal.
     """
@@ -169,9 +169,9 @@ def card(
 
 
 def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> None:
-    """Add the folder and the hook. `options`: more of setup; `secrets`: by file name. It may be repeated.
+    """Add the folder and the hook. `options`: more of setup. `secrets`: by file name. It may be repeated.
 
-    CardError: this is no freshly written card; nothing was changed.
+    CardError: this is not a freshly written card; nothing was changed.
     """
     if not (boot / "cmdline.txt").exists() or not (boot / "config.txt").exists():
         raise CardError(
@@ -217,7 +217,7 @@ def _check_package(path: Path, boot: Path) -> None:
 
 
 def _architecture(boot: Path) -> str | None:
-    """The architecture of the card's system, by its kernels; None if they do not decide it."""
+    """The architecture of the card's system, by its kernels, or None if they do not decide it."""
     is_32_bit = any((boot / f"kernel{kind}.img").exists() for kind in ("", "7", "7l"))
     is_64_bit = (boot / "kernel8.img").exists()
     runs_64_bit = re.search("^arm_64bit=1", _text(boot / "config.txt"), re.MULTILINE)
@@ -238,7 +238,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _hooked(boot: Path) -> tuple[Path, str] | None:
-    """The file for the first start, and its text with our line; None if the Pi has already begun."""
+    """The file for the first start, and the text with our line, or None if the Pi has already begun."""
     user_data, firstrun = boot / "user-data", boot / "firstrun.sh"
     if user_data.exists():
         text = _text(user_data)

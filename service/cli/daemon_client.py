@@ -33,7 +33,7 @@ class BridgeClient:
     fc: str | None = None
 
     def ask(self, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:
-        """Ask the bridge; a refusal ends the program with status 1, an unusable option with 2."""
+        """Ask the bridge. A refusal ends the program with status 1, an unusable option with 2."""
         try:
             if self.fc is None:
                 return ask_daemon(self.state_dir, request, progress)
@@ -54,7 +54,7 @@ class BridgeClient:
     def ask_with_progress(self, request: Json, total: int | None = None) -> Json:
         """Ask for something that takes a while, with a progress bar on standard error.
 
-        `total`: the records to write; None: the bridge reports steps of "step", "done" and "total".
+        `total`: the records to write, or None if the bridge reports steps of "step", "done" and "total".
         """
         on = console(to_error=True)
         with progress_bars(on) as bar:
@@ -79,7 +79,7 @@ class BridgeClient:
 
 
 def daemon_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options that select a daemon; the command gets them as a BridgeClient."""
+    """Add the options that select a daemon. The command gets them as a BridgeClient."""
     state_dir = click.option(
         "--state-dir",
         type=PATH,

@@ -142,7 +142,7 @@ class MissionClient:
         self.texts: list[str] = []
 
     def connect(self, timeout_s: float) -> bool:
-        """Wait for the heartbeat of a vehicle with a flight controller; False if none arrives in time."""
+        """Wait for the heartbeat of a vehicle with a flight controller. Returns False if none arrives in time."""
         end = time.monotonic() + timeout_s
         while time.monotonic() < end:
             self._connection.mav.heartbeat_send(6, 8, 0, 0, 4)  # a ground station
@@ -152,7 +152,7 @@ class MissionClient:
         return False
 
     def write(self, items: Sequence[MissionItem], progress: Callable[[int], None]) -> MissionResult:
-        """Upload a list; returns the type of the final MISSION_ACK."""
+        """Upload a list. Returns the type of the final MISSION_ACK."""
         answer = self._ask(lambda mav, *target: mav.mission_count_send(*target, len(items)), *_REQUESTS, "MISSION_ACK")
         while answer.get_type() in _REQUESTS:
             progress(answer.seq)
@@ -198,7 +198,7 @@ class MissionClient:
 
 @contextmanager
 def connect(host: str, port: int, timeout_s: float) -> Iterator[MissionClient]:
-    """Connect to the vehicle on a UDP port; ClientError if no heartbeat arrives in time."""
+    """Connect to the vehicle on a UDP port. Raises ClientError if no heartbeat arrives in time."""
     os.environ["MAVLINK20"] = "1"  # mavutil reads the version from the environment when it is imported
     from pymavlink import mavutil
 

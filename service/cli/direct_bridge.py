@@ -21,7 +21,7 @@ _SEARCH_TIMEOUT_S = 12.0
 _PORTS_SEARCHED = 3
 #: A round of telemetry takes a second; at 9600 baud two.
 _TELEMETRY_TIMEOUT_S = 3.0
-#: A board that is found by its MAVLink telemetry counts as armed until its heartbeat says otherwise.
+#: A board that is found by its MAVLink telemetry counts as armed until the heartbeat says otherwise.
 _HEARTBEAT_TIMEOUT_S = 1.5
 _INTERVAL_S = 0.05
 _UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
@@ -60,7 +60,7 @@ async def ask_directly(
                 return api.status()
             what = "the Wi-Fi adapter" if isinstance(fc, TcpFc | UdpFc) else "the wiring and the speed"
             raise ControlError(f"no flight controller answers on {where}: check its power and {what}")
-        # The controller is identified before its telemetry arrives, and some never send all of it.
+        # The controller is identified before the telemetry arrives, and some never send all of it.
         if request == STATUS:
             await _wait(lambda: None not in map(api.status().get, _SHOWN), _TELEMETRY_TIMEOUT_S)
         elif request["do"] in FIRMWARE_REQUESTS:

@@ -77,7 +77,7 @@ def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
 def build(checkout: Path) -> None:
     """Patch Harakiri's sources in the folder CHECKOUT, and build them.
 
-    Exit code 1: something is missing, or the build failed; else that of firmware/apply.
+    Exit code 1: something is missing, or the build failed, else that of firmware/apply.
     """
     missing = [package for tool, package in _TOOLS.items() if shutil.which(tool) is None]
     if _TOOLS[_COMPILER] in missing or not _has_c_library():

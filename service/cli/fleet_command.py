@@ -28,7 +28,7 @@ from terminal.sentences import INTERRUPTED, fail
 def mavlink(names: tuple[str, ...], to_all: bool, gcs: tuple[str, ...], **where: Any) -> None:
     """Connect a ground station (Mission Planner, QGroundControl) with vehicles through zenoh, until Ctrl-C.
 
-    The vehicles must accept MAVLink (mavlink_in = true in their [zenoh] table); otherwise the station can only watch.
+    The vehicles must accept MAVLink (mavlink_in = true in their [zenoh] table). Otherwise the station can only watch.
     Several vehicles need different system ids: `fleet enroll` assigns them. With --all the station also gets vehicles
     that appear later.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fleet mavlink` while it runs: the MAVLink of vehicles between zenoh and local ground stations, and its messages."""
+"""`fleet mavlink` while it runs: the MAVLink of vehicles between zenoh and local ground stations, and the messages."""
 
 import asyncio
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ _READ_ONLY = "accepts no MAVLink: zenoh.mavlink_in is off there, or the router d
 #: Every vehicle sends a heartbeat once a second.
 _FIRST_HEARTBEAT_S = 5.0
 _LOOK_S = 0.1
-#: The end of a vehicle's subscription may be known this long before the end of its token.
+#: The end of a vehicle's subscription may be known this long before the end of the token.
 _LEFT_S = 1.0
 
 
@@ -40,7 +40,7 @@ async def relay_fleet(
 ) -> None:
     """Relay vehicles until cancelled. `bridges`: those alive. `is_all`: also vehicles that appear later.
 
-    FleetError if vehicles share a system id or there are more than ids; LinkError if a link cannot be opened.
+    FleetError if vehicles share a system id or there are more than ids. Raises LinkError if a link cannot be opened.
     """
     if len(names) > len(SYSIDS):
         raise FleetError(f"MAVLink has ids for {len(SYSIDS)} vehicles, not for {len(names):,}: use --vehicle")

@@ -78,7 +78,7 @@ def pull(client: BridgeClient, file: Path | None, with_others: bool) -> None:
 
 
 def _show_held(held: Json, file: Path | None, *, is_quiet: bool) -> str:
-    """Write a mission to its file, or print its table; a summary."""
+    """Write a mission to the file, or print the table; a summary."""
     items = mission_items(held["items"])
     summary = f"{held['count']} records, checksum {held['checksum']}"
     if file == _STANDARD_OUTPUT:

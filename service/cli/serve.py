@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The daemon of `naze-bridge run`, with its control socket, page and zenoh node."""
+"""The daemon of `naze-bridge run`, with the control socket, page and zenoh node."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 
 def serve(settings: Settings, load: Callable[[], Settings]) -> None:
-    """Run the daemon until a signal ends it; a failure ends the program with one sentence."""
+    """Run the daemon until a signal ends it. A failure ends the program with one sentence."""
     set_up_logging(settings.log_level)
-    os.umask(0o077)  # logs and missions show where the pilot was; the unit sets the same
+    os.umask(0o077)  # logs and missions show where the pilot was. The unit sets the same
     try:
         _serve(settings, load)
     except (ControlError, LinkError, StoreError, SettingsError, ZenohSettingsError) as error:

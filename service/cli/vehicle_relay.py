@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The zenoh end of one vehicle of `fleet mavlink`: its MAVLink, its mission, and missions for it as commands."""
+"""The zenoh end of one vehicle of `fleet mavlink`: its MAVLink, the mission, and missions for it as commands."""
 
 import asyncio
 from collections.abc import Callable, Container, Sequence
@@ -27,7 +27,7 @@ _MAX_WAITING = 64
 
 
 class VehicleRelay:
-    """Must be made on a running event loop. If the vehicle takes commands, `relay` receives its missions as a whole.
+    """Must be made on a running event loop. If the vehicle takes commands, `relay` receives the missions as a whole.
 
     `bridges`: those that are alive. `sent`: called with the vehicle's name and frames, or none after a result.
     `on_input`: called with its name and False if it does not accept frames, or is gone; with True when it does again.
@@ -55,7 +55,7 @@ class VehicleRelay:
         self._matching = self._input.declare_matching_listener(
             lambda status: post(self._loop, self._input_is, status.matching)
         )
-        # A vehicle that never accepted frames causes no event.
+        # A vehicle that never accepted frames does not cause an event.
         self._first_match = self._loop.call_later(_FIRST_MATCH_S, lambda: self._input_is(self._accepts_input is True))
         self._waiting = 0
         self._subscribers = [session.declare_subscriber(self._key(MAVLINK_OUT.suffix), self._heard)]

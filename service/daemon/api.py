@@ -71,7 +71,7 @@ class DaemonApi:
     async def push(
         self, items: list[MissionItem], source: str, progress: Callable[[Json], None], *, may_erase: bool = True
     ) -> Json:
-        """Check, push and verify a list; an empty one clears the mission. `may_erase`: see LocalMissions.push."""
+        """Check, push and verify a list. An empty one clears the mission. `may_erase`: see LocalMissions.push."""
 
         def written(records: int) -> None:
             progress({"progress": records})
@@ -93,7 +93,7 @@ class DaemonApi:
         return _held(held) | {"others": [_held(other) for other in self._daemon.bridge.missions.others]}
 
     async def _answer(self, start: Callable[[Callable[[T | Refusal], None], float], None]) -> T:
-        """Wait for an operation's result; ControlError if it is refused."""
+        """Wait for an operation's result. Raises ControlError if it is refused."""
         result = await self._daemon.answer(start)
         if isinstance(result, Refusal):
             raise ControlError(result.text)
@@ -156,7 +156,7 @@ class DaemonApi:
         return {"missions": await self._daemon.store.ask(listed)}
 
     async def show_mission(self, number: int) -> Json:
-        """One mission; ControlError if there is none of that number."""
+        """One mission. Raises ControlError if there is none of that number."""
         mission = await self._daemon.store.ask(lambda store: store.get(number))
         if mission is None:
             raise ControlError(f"there is no mission {number}; `naze-bridge missions list` shows the numbers")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Requests to a running daemon through its control socket (service.daemon.control_server).
+"""Requests to a running daemon through the control socket (service.daemon.control_server).
 
 Imports no part of the daemon, so that a command starts quickly.
 """
@@ -32,7 +32,7 @@ class ControlError(Exception):
 
 
 class Interrupted(Exception):
-    """The user interrupted the request; one sentence about its end."""
+    """The user interrupted the request. One sentence about the end."""
 
 
 def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:

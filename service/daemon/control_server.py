@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon's local control socket, through which commands such as `push` and `status` reach a running daemon.
 
-A Unix socket in the state directory; one JSON object a line. A request has the key "do"; the daemon answers with
+A Unix socket in the state directory. One JSON object a line. A request has the key "do". The daemon answers with
 any number of {"progress": ...} lines and one last line with "result" or "error".
 """
 
@@ -26,7 +26,7 @@ from storage.store_error import StoreError
 _MAX_LINE = 1 << 18
 #: Further clients are disconnected.
 _MAX_CLIENTS = 16
-#: The timeout for receiving a request, and for sending its reply.
+#: The timeout for receiving a request, and for sending the reply.
 _REQUEST_TIMEOUT_S = 5.0
 _ANSWER_TIMEOUT_S = 10.0
 #: For finished replies, when the daemon ends.
@@ -47,10 +47,10 @@ class ControlServer:
         self._clients: set[asyncio.Task[None]] = set()
 
     async def start(self) -> None:
-        """Listen; ControlError if that fails.
+        """Listen. Raises ControlError if that fails.
 
         A socket that a killed daemon left behind is replaced, but not a live one: in an unusable state directory there
-        is no state lock.
+        is not a state lock.
         """
         if _is_live(self._path):
             raise ControlError(f"another daemon answers on {self._path}: stop it, or use another --state-dir")
@@ -60,7 +60,7 @@ class ControlServer:
             if self._path.parent.stat().st_uid not in (os.getuid(), 0):
                 raise PermissionError(f"{self._path.parent} belongs to another user")
             self._path.unlink(missing_ok=True)
-            # Python 3.13's start_unix_server removes the socket at the end, and logs an error if its folder is gone.
+            # Python 3.13's start_unix_server removes the socket at the end, and logs an error if the folder is gone.
             listening = socket.socket(socket.AF_UNIX)
             try:
                 listening.bind(str(self._path))

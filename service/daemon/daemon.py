@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running bridge: its links, its store and its clock, on one event loop."""
+"""The running bridge: the links, the store and the clock, on one event loop."""
 
 import asyncio
 import time
@@ -112,9 +112,9 @@ class Daemon:
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
         self.fc = FcConnection(settings, host, self.bridge, self.traffic["fc"], self.flush)
         self.gcs = GcsConnections(self.bridge, self.traffic, self.flush)
-        #: Why missions are kept in memory only; empty if they are stored.
+        #: Why missions are kept in memory only, or empty if they are stored.
         self.store_trouble = ""
-        #: Why the page cannot be opened now; empty if it can, or there is none.
+        #: Why the page cannot be opened now, or empty if it can, or there is none.
         self.page_trouble = ""
         self.store = StoreWorker(settings.state_dir, self._cannot_store)
         #: Set when ground stations can connect.
@@ -155,7 +155,7 @@ class Daemon:
             try:
                 await self.fc.run()
             finally:
-                # The sender of a mission that ended with the port gets its reply once the outcome is stored.
+                # The sender of a mission that ended with the port gets the reply once the outcome is stored.
                 await self.is_at_rest(_STORE_TIMEOUT_S)
 
     def add_follower(self, follower: Follower) -> None:
@@ -172,7 +172,7 @@ class Daemon:
         self._signing.reset()
 
     def change_links(self, gcs: Sequence[GcsAddress]) -> None:
-        """Serve ground stations over these links; those that stay are not interrupted."""
+        """Serve ground stations over these links. Those that stay are not interrupted."""
         # A link that cannot be opened is left out, so that the next reload tries it again.
         self.settings = replace(self.settings, gcs=self.gcs.change(self.settings.gcs, gcs))
 
@@ -205,7 +205,7 @@ class Daemon:
             self._lane.set_timer(self.bridge.due, self._tick)
 
     async def answer(self, start: Callable[[Callable[[T], None], float], None]) -> T:
-        """Start an operation of the bridge at the given time, and wait until it calls back with its result."""
+        """Start an operation of the bridge at the given time, and wait until it calls back with the result."""
         future: asyncio.Future[T] = self._loop.create_future()
 
         def done(result: T) -> None:
@@ -217,7 +217,7 @@ class Daemon:
         return await future
 
     async def finish(self) -> None:
-        """Start no more transfers; the current one finishes soon, or is aborted cleanly."""
+        """Start no more transfers. The current one finishes soon, or is aborted cleanly."""
         self.bridge.stop_missions(self._loop.time())
         self.flush()
         if not await self.is_at_rest(_FINISH_S):
@@ -229,7 +229,7 @@ class Daemon:
         await self.is_at_rest(_ABORT_S)
 
     async def is_at_rest(self, seconds: float) -> bool:
-        """Wait for the end of all conversations, with a timeout; True if there are none."""
+        """Wait for the end of all conversations, with a timeout. Returns True if there are none."""
         for _ in range(int(seconds / _REST_INTERVAL_S)):
             if not self.bridge.is_busy:
                 break

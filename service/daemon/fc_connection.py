@@ -61,7 +61,7 @@ class FcConnection:
 
     @property
     def trouble(self) -> str:
-        """Why the flight controller cannot be used: its port, or its state; empty if it can be."""
+        """Why the flight controller cannot be used: the port, or the state, or empty if it can be."""
         return self._port.trouble or self._bridge.fc_trouble
 
     @property
@@ -96,7 +96,7 @@ class FcConnection:
 
     @asynccontextmanager
     async def lend(self) -> AsyncIterator[serial.Serial]:
-        """Lend the serial port, at 115200 baud; afterwards the flight controller is searched again. PortError."""
+        """Lend the serial port, at 115200 baud. Afterwards the flight controller is searched again. PortError."""
         if not isinstance(self._address, SerialFc | AutoFc):
             raise PortError(f"{self._address} is not a serial port")
         async with self._port.lend():

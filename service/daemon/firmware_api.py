@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The requests for new firmware, as part of DaemonApi: the daemon lends its port to the flashing and takes it back.
+"""The requests for new firmware, as part of DaemonApi: the daemon lends the port to the flashing and takes it back.
 
-Order: the image and the board are checked; the settings are printed by the board; its flash is read and stored; then
+Order: the image and the board are checked; the settings are printed by the board; the flash is read and stored, then
 it is erased, written and read back; the firmware starts, and must be found by the bridge.
 """
 
@@ -48,7 +48,7 @@ _BY_HAND_S = 90.0
 _BOOT_LOADER_S = 5.0
 #: A whole chip takes 60 s; the port comes back after this time in any case.
 _LONGEST_S = 600.0
-#: A Harakiri that looks for its GPS boots for 25 s; then it is identified.
+#: A Harakiri that looks for the GPS boots for 25 s, then it is identified.
 _PROOF_S = 45.0
 _LOOK_S = 0.1
 #: A dump has three decimals.
@@ -67,7 +67,7 @@ _log = structlog.get_logger()
 
 
 class FirmwareApi:
-    """The requests, as coroutines with plain data; ControlError if one fails. `state_dir`: for backups."""
+    """The requests, as coroutines with plain data. Raises ControlError if one fails. `state_dir`: for backups."""
 
     def __init__(self, daemon: Daemon, settings: SettingsApi, state_dir: Path | None) -> None:
         self._daemon = daemon
@@ -125,7 +125,7 @@ class FirmwareApi:
         return True
 
     async def _flash(self, image: bytes, is_running: bool, progress: Progress) -> Path:
-        """Rewrite the flash. Returns the path of its backup."""
+        """Rewrite the flash. Returns the path of the backup."""
         is_changed = False
 
         def step(name: str, done: int, total: int) -> None:
@@ -186,7 +186,7 @@ class FirmwareApi:
         return path
 
     async def _restore_settings(self, path: Path) -> str:
-        """Restore the settings printed before, if the new firmware has begun with its defaults."""
+        """Restore the settings printed before, if the new firmware has begun with the defaults."""
         try:
             before = settings_in(file_text(await asyncio.to_thread(read_bounded, path, _MAX_DUMP)))
             plan = await self._settings.plan(before, "")
@@ -210,7 +210,7 @@ class FirmwareApi:
         )
 
     async def _proof(self, wanted: str | None) -> str:
-        """The running firmware; ControlError if it is not `wanted`, or nothing answers."""
+        """The running firmware. Raises ControlError if it is not `wanted`, or nothing answers."""
         for _ in range(int(_PROOF_S / _LOOK_S)):
             if (found := self._daemon.report().link.flight_controller) is not None:
                 if wanted in (None, found):

@@ -29,7 +29,7 @@ class FlightFile:
         self._saved: FlightMemory | None = None
 
     def load(self, now: float) -> FlightMemory | None:
-        """The craft that the previous daemon left armed, if it counts; `now`: monotonic seconds."""
+        """The craft that the previous daemon left armed, if it counts. `now`: monotonic seconds."""
         if self._file is not None:
             self._saved = self._file.load(lambda kept: self._read(kept, now))
             if self._saved is not None:

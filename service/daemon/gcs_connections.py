@@ -35,7 +35,7 @@ class GcsConnections:
         self.remove_default_peer = bridge.remove_default_peer
 
     def open(self, address: GcsAddress) -> None:
-        """Open a link; LinkError if that fails."""
+        """Open a link. Raises LinkError if that fails."""
         self.add(open_link(address, self))
 
     def warn(self, address: GcsAddress) -> None:
@@ -46,7 +46,7 @@ class GcsConnections:
         self._links[link.name] = link
 
     def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> tuple[GcsAddress, ...]:
-        """Replace links; those that stay are not interrupted. Returns the open ones."""
+        """Replace links. Those that stay are not interrupted. Returns the open ones."""
         for address in old:
             if address not in new and (link := self._links.get(str(address))) is not None:
                 self._bridge.link_closed(link.name, self._loop.time())
@@ -79,7 +79,7 @@ class GcsConnections:
             if not self._bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram):
                 return
         except Exception:
-            # A ground station must not be able to reset the flight controller's line: only its data is dropped.
+            # A ground station must not be able to reset the flight controller's line: only the data is dropped.
             _log.exception("gcs.fault", peer=str(peer))
         self._flush()
 

@@ -14,9 +14,9 @@ _MOST = 16
 
 
 class LastSettings:
-    """A SettingsMemory. A board without a unique number is identified by its port.
+    """A SettingsMemory. A board without a unique number is identified by the port.
 
-    Without a `folder` nothing is stored.
+    Without a `folder` it does not store anything.
     """
 
     def __init__(self, folder: Path | None, port: Callable[[], str]) -> None:

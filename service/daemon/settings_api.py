@@ -119,7 +119,7 @@ class SettingsApi:
         return _data(after) | {"was": setting.value, "text": text}
 
     async def _answer(self, start: Callable[[Callable[[T | SettingRefusal, float], None], float], None]) -> T:
-        """Wait for an operation's result; ControlError if it is refused."""
+        """Wait for an operation's result. Raises ControlError if it is refused."""
 
         def begin(done: Callable[[T | SettingRefusal], None], now: float) -> None:
             start(lambda result, _at: done(result), now)
@@ -131,7 +131,7 @@ class SettingsApi:
 
 
 def _backup(store: MissionStore, number: int) -> Json:
-    """Answer the request "backup"; ControlError if there is none of that number."""
+    """Answer the request "backup". Raises ControlError if there is none of that number."""
     backup = store.backups.get(number)
     if backup is None:
         raise ControlError(f"there is no backup {number}; `naze-bridge settings history` shows the numbers")

@@ -30,7 +30,7 @@ _log = structlog.get_logger()
 
 
 class StoreWorker:
-    """Carries out the bridge's store effects in order. Without a `directory` nothing is stored.
+    """Carries out the bridge's store effects in order. Without a `directory` it does not store anything.
 
     In an unusable directory missions are kept in memory; `on_trouble` gets the reason, on the event loop.
     """
@@ -40,7 +40,7 @@ class StoreWorker:
         self._thread = BackgroundThread("store", _TIMEOUT_S)
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
-        #: The file; None while missions are kept in memory.
+        #: The file, or None while missions are kept in memory.
         self._path: Path | None = None
         if directory is not None:
             self._thread.submit(partial(self._open, directory))
@@ -67,7 +67,7 @@ class StoreWorker:
         self._thread.submit(work)
 
     async def ask(self, question: Callable[[MissionStore], T]) -> T:
-        """Run a query on the store; StoreError if there is no store, it fails or does not answer in time."""
+        """Run a query on the store. Raises StoreError if there is no store, it fails or does not answer in time."""
 
         def work() -> T:
             if self._store is None:

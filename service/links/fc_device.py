@@ -18,7 +18,7 @@ from service.machine.threads import BackgroundThread
 from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, UdpFc, bindable, family_of
 from storage.os_error import reason
 
-#: Errors of an open port: pyserial raises the last two if it is unplugged, or its driver refuses the speed.
+#: Errors of an open port: pyserial raises the last two if it is unplugged, or the driver refuses the speed.
 DEVICE_ERRORS = (OSError, termios.error, ValueError)
 #: A poll takes 75 ms at 1200 baud.
 _LAST_FRAME_S = 0.1
@@ -39,7 +39,7 @@ class Device(Protocol):
 
 
 class PortError(Exception):
-    """The device cannot be opened now; the text is one sentence for the user."""
+    """The device cannot be opened now. The text is one sentence for the user."""
 
 
 class PortInUseError(PortError):
@@ -64,12 +64,12 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
     from simulator.links.pipe_link import SimLink
     from simulator.naze.board import SimulatedNaze
 
-    # One board for all openings: its mission survives a lost port, as a real board's does.
+    # One board for all openings: the mission survives a lost port, as a real board's does.
     return SimLink(SimulatedNaze(), asyncio.get_running_loop()).start
 
 
 def open_serial(path: str) -> serial.Serial:
-    """Open a serial port for exclusive use; PortError if that fails."""
+    """Open a serial port for exclusive use. Raises PortError if that fails."""
     console = find_console(path)
     if console is not None:
         raise PortInUseError(

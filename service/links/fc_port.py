@@ -43,7 +43,7 @@ class FcPort:
 
     `on_open`, `on_data` and `on_close` are called from the event loop. `traffic` counts the bytes read.
 
-    The first failure to open is logged as a warning; a repetition is not logged again.
+    The first failure to open is logged as a warning. A repetition is not logged again.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class FcPort:
             self._shut(STOPPED)
 
     async def _open_once(self) -> float:
-        """Try to open the port; the pause before the next attempt, s."""
+        """Try to open the port. The pause before the next attempt, s."""
         try:
             self._device = await self._open()
         except (PortError, OSError) as error:
@@ -116,7 +116,7 @@ class FcPort:
 
     @asynccontextmanager
     async def lend(self) -> AsyncIterator[None]:
-        """Keep the port closed, so that the caller may open it; afterwards it is opened again."""
+        """Keep the port closed, so that the caller may open it. Afterwards it is opened again."""
         self.is_lent = True
         try:
             self._shut(LENT)
@@ -126,7 +126,7 @@ class FcPort:
             self.is_lent = False
 
     def move_on(self) -> None:
-        """Close the port. It is reopened, and `open_device` may choose another one."""
+        """Close the port. It is reopened, and `open_device` may choose another."""
         self._shut(MOVED_ON)
 
     def set_speed(self, baud: int | None) -> None:
@@ -142,7 +142,7 @@ class FcPort:
             self._shut(str(error))
 
     def write(self, data: bytes, *, asks: bool = False) -> None:
-        """Write without blocking; the rest is sent when the port is writable. `asks`: a reply is expected."""
+        """Write without blocking. The rest is sent when the port is writable. `asks`: a reply is expected."""
         if self._device is None:
             return
         if asks:
@@ -176,7 +176,7 @@ class FcPort:
             self._loop.remove_writer(self._descriptor)
 
     def hold(self, until: float) -> None:
-        """Read nothing before this time, unless something is written that asks for a reply."""
+        """Do not read before this time, unless something is written that asks for a reply."""
         if self._device is not None:
             self._lane.hold(until)
 
@@ -199,7 +199,7 @@ class FcPort:
         self._on_data(data, now)
 
     def _gather(self, size: int, now: float) -> None:
-        """Delay the next read if the last one brought much for the time since the one before."""
+        """Delay the next read if the last brought much for the time since the one before."""
         since_s, self._read_at = now - self._read_at, now
         if size >= _GATHERED_RATE * since_s and now >= self._gathers_from:
             self._lane.hold(now + min(max(_GATHERED_SIZE / size * since_s, _SHORTEST_DELAY_S), _LONGEST_DELAY_S))
@@ -207,7 +207,7 @@ class FcPort:
     def _acknowledge(self) -> None:
         """Let the TCP connection acknowledge received bytes at once, not 40 ms later.
 
-        INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first one.
+        INAV 6.1's simulator and cheap serial adapters send replies byte by byte, and wait for this after the first.
         """
         assert isinstance(self._device, socket.socket)
         with suppress(OSError):

@@ -20,7 +20,7 @@ _HINTS = {
 
 
 class LinkError(Exception):
-    """A link cannot be set up; the text is one sentence for the user."""
+    """A link cannot be set up. The text is one sentence for the user."""
 
 
 class GcsLink(Protocol):

@@ -13,7 +13,7 @@ from service.settings.addresses import family_of
 from service.settings.settings import ShareSettings
 from storage.os_error import reason
 
-#: A program that does not read its replies is disconnected.
+#: A program that does not read the replies is disconnected.
 _MAX_UNSENT = 65536
 #: A further program displaces the one that has been silent for longest, of the host with the most programs: its laptop
 #: may have been switched off.

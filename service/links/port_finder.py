@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`fc = "auto"`: opens serial ports in turn until a flight controller is found.
 
-The flight controller's last port is probed at once; any other is first listened to. A port that another program uses is
+The flight controller's last port is probed at once. Any other is first listened to. A port that another program uses is
 not opened, and one that turned out to be a GPS receiver or a radio is not opened again.
 """
 
@@ -27,7 +27,7 @@ from storage.os_error import reason
 PORTS_FILE = "ports.json"
 #: The search visits all speeds within this time.
 _SEARCH_S = 9.0
-#: How long to wait for a lost flight controller: a Harakiri that looks for its GPS boots for 25 s.
+#: How long to wait for a lost flight controller: a Harakiri that looks for the GPS boots for 25 s.
 _RETURN_S = 40.0
 _RETRY_S = 1.0
 _READ_SIZE = 4096
@@ -41,7 +41,7 @@ class PortMemory:
     def __init__(self, folder: Path | None) -> None:
         self._file = StateFile(folder, PORTS_FILE, "every port is searched again")
         self.close = self._file.close
-        #: The last port of the flight controller; empty at first.
+        #: The last port of the flight controller, or empty at first.
         self.flight_controller = ""
         #: Ports to skip, and the device found on each.
         self.others: dict[str, str] = {}
@@ -82,7 +82,7 @@ class PortFinder:
         self._present: SerialPort | None = None
         self._tried: set[str] = set()
         self._timer: asyncio.TimerHandle | None = None
-        #: Why each port was skipped, by its path.
+        #: Why each port was skipped, by the path.
         self._passed: dict[str, str] = {}
         self.move_on: Callable[[], None] = lambda: None
 
@@ -92,7 +92,7 @@ class PortFinder:
         return "the serial ports" if self._present is None else self._present.path
 
     async def open(self) -> serial.Serial:
-        """Open the next port that may have a flight controller; PortError if there is none now."""
+        """Open the next port that may have a flight controller. Raises PortError if there is none now."""
         self._leave()
         for port in self._in_turn():
             self._tried.add(port.key)
@@ -111,7 +111,7 @@ class PortFinder:
         raise PortError("there is no serial port: plug the flight controller in, or enable the UART on the header")
 
     def port_of_silent_board(self) -> str:
-        """The port of a flight controller that need not answer: its last one, or the only one. PortError."""
+        """The port of a flight controller that need not answer: the last, or the only one. PortError."""
         ports = serial_ports(self._host)
         for port in ports:
             if port.key == self._memory.flight_controller:
@@ -174,7 +174,7 @@ class PortFinder:
         return device
 
     async def _listen(self, device: serial.Serial) -> str:
-        """The other device recognised on the port; empty if none. Sends nothing."""
+        """The other device recognised on the port, or empty if none. Does not send anything."""
         listener = PortListener(self._loop.time())
         readable = asyncio.Event()
         self._loop.add_reader(device.fileno(), readable.set)

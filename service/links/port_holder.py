@@ -42,7 +42,7 @@ def find_console(path: str) -> str | None:
 
 
 def find_user(host: Host, path: str) -> str | None:
-    """The name of another program that has the port open, or was started with its name; None if none is found.
+    """The name of another program that has the port open, or was started with its name, or None if none is found.
 
     A service cannot see the open files of root's programs, but it sees their command lines: `gpsd /dev/ttyUSB0`.
     """

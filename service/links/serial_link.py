@@ -21,7 +21,7 @@ from storage.os_error import reason
 
 _READ_SIZE = 512
 _REOPEN_S = 1.0
-#: The part of the serial rate that is used. The radio's own rate in the air may be lower: then its buffer fills, and it
+#: The part of the serial rate that is used. The radio's own rate in the air may be lower: then the buffer fills, and it
 #: says so in RADIO_STATUS.txbuf (percent free).
 _SHARE, _LEAST_SHARE = 0.8, 0.1
 _FULL, _EMPTY = 33, 90
@@ -32,7 +32,7 @@ _log = structlog.get_logger()
 
 
 class SerialLink:
-    """One peer. Its bytes are sent no faster than the port's rate; the port is reopened whenever it comes back."""
+    """One peer. The bytes are sent no faster than the port's rate. The port is reopened whenever it comes back."""
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)

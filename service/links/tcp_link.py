@@ -14,11 +14,11 @@ from service.settings.addresses import GcsAddress, bindable, family_of
 
 #: Small, so that the requests of a client that floods do not delay those of others.
 _READ_SIZE = 512
-#: Unsent bytes for a stalled client. Above this it gets no telemetry; at twice as many it is disconnected.
+#: Unsent bytes for a stalled client. Above this it does not get telemetry. At twice as many it is disconnected.
 _MAX_UNSENT = 32768
 #: The kernel would buffer minutes of old telemetry for a client that does not read.
 _KERNEL_BUFFER = 32768
-#: A client that acknowledges nothing for this long is lost: out of Wi-Fi range it cannot close the connection.
+#: A client that does not acknowledge anything for this long is lost: out of Wi-Fi range it cannot close the connection.
 _STALL_MS = 60000
 #: Each costs a copy of the telemetry.
 _MAX_CLIENTS = 32
@@ -84,7 +84,7 @@ class TcpLink:
 
     def joined(self, client: "_TcpClient", sender: tuple[str, int]) -> Peer:
         if len(self._clients) >= _MAX_CLIENTS:
-            # Of the machine with the most connections one that has sent nothing, or the one silent for longest.
+            # Of the machine with the most connections one that has not sent anything, or the one silent for longest.
             connections = Counter(peer.host for peer in self._clients)
             displaced, former = max(
                 self._clients.items(),
@@ -146,5 +146,5 @@ class _TcpClient(asyncio.BufferedProtocol):
             return
         self.transport.write(data)
         if unsent > 2 * _MAX_UNSENT:
-            # With this many unread replies, another one would be useless.
+            # With this many unread replies, another would be useless.
             self.transport.abort()

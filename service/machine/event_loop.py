@@ -41,13 +41,13 @@ class FastLane:
         self._watched, self.on_readable = descriptor, on_readable
 
     def unwatch(self) -> None:
-        """Stop watching the port. Its descriptor must still be open."""
+        """Stop watching the port. The descriptor must still be open."""
         if self.on_readable is not None:
             self._port.unregister(self._watched)
             self.on_readable, self.held_until = None, -inf
 
     def hold(self, until: float) -> None:
-        """Read nothing before this time: too little will have arrived to be worth a wake-up."""
+        """Do not read before this time: too little will have arrived to be worth a wake-up."""
         self.held_until = until
 
     def set_timer(self, at: float, call: _Call) -> None:

@@ -28,7 +28,7 @@ class HelperError(Exception):
 
 
 def unit_of(action: object) -> str | None:
-    """The unit for an action; None if there is no such action."""
+    """The unit for an action, or None if there is no such action."""
     return next((unit for unit, actions in UNITS.items() if action in actions), None)
 
 

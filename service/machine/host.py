@@ -33,7 +33,7 @@ class Process:
 
     @property
     def name(self) -> str:
-        """The program's file; of Python the script or module."""
+        """The program's file. Of Python the script or module."""
         words = [os.path.basename(word) for word in self.arguments] or [""]
         if not re.fullmatch(r"python[\d.]*", words[0]) or "-c" in words[1:3]:
             return words[0]
@@ -83,7 +83,7 @@ class Host:
         return stat.S_ISCHR(status.st_mode) and is_listed
 
     def read(self, path: str) -> str:
-        """A file's text; empty if it cannot be read."""
+        """A file's text, or empty if it cannot be read."""
         try:
             return read_bounded(self.path(path), _MAX_BYTES).decode(errors="replace")
         except OSError:
@@ -99,7 +99,7 @@ class Host:
             yield Process(int(name), tuple(words[:-1]))
 
     def holder(self, link: str) -> Process | None:
-        """The program that has a file or socket open, by its descriptor's target ("/dev/ttyS0", "socket:[4711]")."""
+        """The program that has a file or socket open, by the descriptor's target ("/dev/ttyS0", "socket:[4711]")."""
         return next((process for process in self.processes() if self.has_open(process, link)), None)
 
     def stop_command(self, process: Process) -> str:
@@ -122,7 +122,7 @@ class Host:
     def has_login(self, terminal: str) -> bool:
         """True if a login console runs on a terminal, such as ttyS0.
 
-        It takes no lock: both programs could open the port, and each would lose half of the input.
+        It does not take a lock: both programs could open the port, and each would lose half of the input.
         """
         return any(process.name in LOGIN_PROGRAMS and terminal in process.arguments[1:] for process in self.processes())
 
@@ -136,7 +136,7 @@ class Host:
         return [address for name in cards if (address := self.address(name)) is not None]
 
     def address(self, interface: str) -> str | None:
-        """A network interface's IPv4 address; None if it has none."""
+        """A network interface's IPv4 address, or None if it has none."""
         import fcntl  # Windows, where `naze-bridge card` runs too, has none
 
         request = struct.pack("256s", interface.encode()[:15])

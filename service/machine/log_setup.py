@@ -108,7 +108,7 @@ class _LeastLevel:
 
 
 class _RateLimit:
-    """Keeps repeated events from flooding the log; the number of suppressed ones is logged with the next line."""
+    """Keeps repeated events from flooding the log. The number of suppressed ones is logged with the next line."""
 
     def __init__(self) -> None:
         self._seen: dict[str, tuple[float, int]] = {}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages to systemd, and its watchdog interval: sd_notify(3).
 
-The protocol is one datagram; the packages for it that have a wheel lack STOPPING and RELOADING, and
+The protocol is one datagram. The packages for it that have a wheel lack STOPPING and RELOADING, and
 may block on a slow systemd, which the links' loop must not.
 """
 
@@ -48,7 +48,7 @@ class Notifier:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float | None:
-    """The watchdog's timeout, seconds; None if it is not meant for this process."""
+    """The watchdog's timeout, seconds, or None if it is not meant for this process."""
     for_us = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     microseconds = environment.get("WATCHDOG_USEC", "")
     return int(microseconds) / 1e6 if for_us and microseconds.isdecimal() else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The installed naze-bridge: its version, and the location of its documentation on this machine."""
+"""The installed naze-bridge: the version, and the location of its documentation on this machine."""
 
 import sys
 from contextlib import suppress
@@ -21,7 +21,7 @@ def shipped(name: str) -> Path:
 
 
 def address(label: str) -> str | None:
-    """The project's "Repository" or "Issues" address, from pyproject.toml; None if it is not published."""
+    """The project's "Repository" or "Issues" address, from pyproject.toml, or None if it is not published."""
     folder = _metadata_of("naze-bridge")
     lines = [] if folder is None else (folder / "METADATA").read_text(encoding="utf-8").splitlines()
     head = f"Project-URL: {label}, "

@@ -14,7 +14,7 @@ SYNCHRONIZED = "/run/systemd/timesync/synchronized"
 
 @dataclass(frozen=True, slots=True)
 class PiModel:
-    """`name`: from the device tree; `header_uart`: the device on pins 8 and 10; `config_line`: enables it."""
+    """`name`: from the device tree. `header_uart`: the device on pins 8 and 10. `config_line`: enables it."""
 
     name: str
     header_uart: str
@@ -22,9 +22,9 @@ class PiModel:
 
 
 def pi_model(host: Host) -> PiModel | None:
-    """The machine's Raspberry Pi model; None on other machines.
+    """The machine's Raspberry Pi model, or None on other machines.
 
-    On a Pi 5 /dev/serial0 is usually the debug socket between the HDMI plugs (ttyAMA10); the header always has ttyAMA0.
+    On a Pi 5 /dev/serial0 is usually the debug socket between the HDMI plugs (ttyAMA10). The header always has ttyAMA0.
     On earlier models serial0 is the header's: ttyS0 where Bluetooth has the better UART, else ttyAMA0.
     """
     name = host.read("/proc/device-tree/model").rstrip("\0\n")
@@ -41,12 +41,12 @@ def is_clock_set(host: Host) -> bool:
 
 
 def boot_file(host: Host, name: str) -> str | None:
-    """Path of config.txt or cmdline.txt; None if there is none."""
+    """Path of config.txt or cmdline.txt, or None if there is none."""
     paths = [f"{folder}/{name}" for folder in BOOT_FOLDERS]
     return next((path for path in paths if host.path(path).exists()), None)
 
 
 def wifi_country(host: Host) -> str | None:
-    """The country, such as "DE", that raspi-config has set; without one the radio is blocked."""
+    """The country, such as "DE", that raspi-config has set. Without one the radio is blocked."""
     found = re.search(r"cfg80211\.ieee80211_regdom=([A-Z]{2})", host.read(boot_file(host, "cmdline.txt") or ""))
     return found and found[1]

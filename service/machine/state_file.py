@@ -23,7 +23,7 @@ _log = structlog.get_logger()
 class StateFile:
     """Written by its own thread, because an SD card may take a second. `without`: the effect of losing it.
 
-    Without a `folder` nothing is stored.
+    Without a `folder` it does not store anything.
     """
 
     def __init__(self, folder: Path | None, name: str, without: str) -> None:
@@ -33,7 +33,7 @@ class StateFile:
         self._thread = None if folder is None else BackgroundThread(name)
 
     def load(self, read: Callable[[Any], T]) -> T | None:
-        """The contents, converted by `read`; None if there are none, or they are damaged, which is logged."""
+        """The contents, converted by `read`, or None if there are none, or they are damaged, which is logged."""
         if self._thread is None:
             return None
         try:

@@ -46,7 +46,7 @@ class BackgroundThread:
         self._work.put(work)
 
     async def ask(self, work: Callable[[], T]) -> T:
-        """Queue a job that may raise, and return its result; TimeoutError. Called on an event loop."""
+        """Queue a job that may raise, and return the result; TimeoutError. Called on an event loop."""
         answer: Future[T] = Future()
 
         def run() -> None:
@@ -66,7 +66,7 @@ class BackgroundThread:
             raise TimeoutError("the disk does not answer in time: it is busy or failing; check dmesg") from None
 
     def close(self, timeout_s: float) -> bool:
-        """Run the remaining jobs and end; False on timeout."""
+        """Run the remaining jobs and end. Returns False on timeout."""
         self._work.put(None)
         self._thread.join(timeout_s)
         return not self._thread.is_alive()

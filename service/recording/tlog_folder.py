@@ -99,7 +99,7 @@ class TlogFolder:
             self._give_up(error, now)
 
     def close(self) -> None:
-        """Close the open file, and delete it if it is empty; the next `write` begins another one."""
+        """Close the open file, and delete it if it is empty. The next `write` begins another."""
         if self._file is not None:
             file, self._file = self._file, None
             with suppress(OSError), file:
@@ -117,7 +117,7 @@ class TlogFolder:
         return path
 
     def _make_room(self, now: datetime) -> None:
-        """Remove the oldest files until another one fits, flights last, which have no age limit.
+        """Remove the oldest files until another fits, flights last, which have no age limit.
 
         Files with other names are left alone.
         """

@@ -24,7 +24,7 @@ _FLUSH_S = 1.0
 _CLOSE_TIMEOUT_S = 1.0
 #: Bytes beyond this are dropped while an SD card stalls: minutes of telemetry, which takes six times as much memory.
 _MAX_WAITING = 1 << 20
-#: When frames were sent or received, monotonic nanoseconds; True if they belong to a flight; and the frames.
+#: When frames were sent or received, monotonic nanoseconds, or True if they belong to a flight, and the frames.
 _Taken = tuple[int, bool, Sequence[bytes]]
 
 _log = structlog.get_logger()

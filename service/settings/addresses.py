@@ -12,7 +12,7 @@ UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numb
 
 
 class AddressError(ValueError):
-    """A connection string that cannot be understood; the text says what to write instead."""
+    """A connection string that cannot be understood. The text says what to write instead."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ _NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:|/)")
 
 
 def parse_fc(text: str) -> FcAddress:
-    """Read the --fc string; AddressError if it is not valid."""
+    """Read the --fc string. Raises AddressError if it is not valid."""
     kind, colon, rest = text.strip().partition(":")
     match kind.lower():
         case "auto" if not rest:
@@ -139,12 +139,12 @@ def _parse_serial(text: str, port: str) -> SerialFc:
 
 
 def split_gcs(text: str) -> list[str]:
-    """Split "udpin:14550,tcpin:5760" into its links."""
+    """Split "udpin:14550,tcpin:5760" into the links."""
     return _NEXT_LINK.split(text)
 
 
 def parse_gcs(text: str) -> GcsAddress:
-    """Read one --gcs string; AddressError if it is not valid, or ambiguous.
+    """Read one --gcs string. Raises AddressError if it is not valid, or ambiguous.
 
     >>> str(parse_gcs("udpin:0.0.0.0:14550"))
     'udpin:0.0.0.0:14550'
@@ -159,7 +159,7 @@ def parse_gcs(text: str) -> GcsAddress:
     rest = rest.removeprefix("//")
     host, _, port = rest.replace(",", ":").rpartition(":")
     if colon and kind in ("udp", "tcp"):
-        # pymavlink listens at udp:, MAVSDK listens or sends; in both, tcp: connects, which the bridge does not.
+        # pymavlink listens at udp:, MAVSDK listens or sends. In both, tcp: connects, which the bridge does not.
         if host not in _EVERY_ADDRESS:
             port = port if port.isdecimal() else "14550"
             sending = f"udpout:{host}:{port} to send there, " if kind == "udp" else ""
@@ -173,7 +173,7 @@ def parse_gcs(text: str) -> GcsAddress:
 
 
 def parse_table(entry: object, setting: str, example: str, keys: Sequence[str]) -> tuple[GcsAddress, dict[str, object]]:
-    """The address of a link's table {address = ...}, and the table itself; other keys than `keys` are errors."""
+    """The address of a link's table {address = ...}, and the table itself. Other keys than `keys` are errors."""
     if not isinstance(entry, dict) or not isinstance(entry.get("address"), str):
         raise AddressError(f'{setting}: {entry!r} is not a table with address = "{example}"')
     address = parse_gcs(entry["address"])
@@ -196,7 +196,7 @@ def _meant_gcs(word: str, rest: str) -> str:
 
 
 def family_of(host: str) -> socket.AddressFamily:
-    """AF_INET6 for an IPv6 address; a name means an IPv4 address."""
+    """AF_INET6 for an IPv6 address. A name means an IPv4 address."""
     return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 

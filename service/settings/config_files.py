@@ -20,7 +20,7 @@ SETUP_FILE = "setup.toml"
 PAGE_FILE = "page.toml"
 _MAX_BYTES = 1 << 20
 _NAMES = frozenset(key.name for key in KEYS)
-#: A line with a table's header, or a key and the beginning of its value.
+#: A line with a table's header, or a key and the beginning of the value.
 _NAMING = re.compile(r"\s*(?:\[\s*(?P<table>[\w.-]+)\s*\]|(?P<key>[\w.-]+)\s*=)")
 
 Keys = tuple[str, ...]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One setting: its name, its meaning, how its value is read, and the problems of a wrong one."""
+"""One setting: its name, its meaning, how the value is read, and the problems of a wrong one."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Example(str):
 
 
 class Unfit(ValueError):
-    """A value that cannot be used; the text continues a sentence after the key's name: "is 7, but must be ..."."""
+    """A value that cannot be used. The text continues a sentence after the key's name: "is 7, but must be ..."."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class SettingsError(ValueError):
 
 
 class Reader(NamedTuple):
-    """Converts a given value to the one used. `read` gets the value, and the folder of its file.
+    """Converts a given value to the one used. `read` gets the value, and the folder of the file.
 
     It raises Unfit, or another ValueError with a whole sentence. `choices`: all values, as in the file, if they can be
     listed.
@@ -62,7 +62,7 @@ class Reader(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """`name`: with its table, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
+    """`name`: with the table, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
 
     `example`: for the sample file, if there is no default. `is_live`: a reload applies it.
     """
@@ -100,7 +100,7 @@ def text(wanted: str = "text in quotes", parse: Callable[[str], object] = str) -
 
 
 def file_name(*, in_config_folder: bool = False) -> Reader:
-    """A file or folder; if `in_config_folder`, a relative path starts at the configuration file's folder."""
+    """A file or folder. If `in_config_folder`, a relative path starts at the configuration file's folder."""
 
     def read(value: object, folder: Path) -> object:
         if not isinstance(value, str) or not value or "\0" in value:

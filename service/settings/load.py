@@ -25,7 +25,7 @@ SERVICE_STATE = Path("/var/lib/naze-bridge")
 
 
 def default_state_dir() -> Path:
-    """Systemd's StateDirectory, else the user's own state folder; SettingsError if there is no such user."""
+    """Systemd's StateDirectory, else the user's own state folder. Raises SettingsError if there is no such user."""
     given = os.environ.get("STATE_DIRECTORY")
     if given:
         return Path(given.split(":")[0])
@@ -76,7 +76,7 @@ def load_settings(
 
 
 def takeoff_limit_m() -> int:
-    """The takeoff_max_m of a daemon on this machine, for commands without one; SettingsError if unusable."""
+    """The takeoff_max_m of a daemon on this machine, for commands without one. Raises SettingsError if unusable."""
     named = os.environ.get(CONFIG_VARIABLE)
     config = Path(named or SERVICE_CONFIG)
     problems: list[Problem] = []

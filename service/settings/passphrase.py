@@ -13,7 +13,7 @@ import string
 LEAST_BITS = 80
 #: The remedy for a weak key.
 STRONGER = "make a random one: sudo naze-bridge setup --new-key"
-#: No character that looks like another one, and no capitals to type on a phone.
+#: No character that looks like another, and no capitals to type on a phone.
 _ALPHABET = "abcdefghjkmnpqrstvwxyz23456789"
 _GROUPS, _GROUP_SIZE = 4, 5
 #: Characters that a guesser has to try for each class in use; other ones count as 100.
@@ -46,6 +46,6 @@ def most_bits(passphrase: str) -> float:
 
 
 def weakness(passphrase: str) -> str | None:
-    """Why a passphrase is weak, after "the key"; None if it is not known to be."""
+    """Why a passphrase is weak, after "the key", or None if it is not known to be."""
     bits = most_bits(passphrase)
     return None if bits >= LEAST_BITS else f"is weak: {bits:.0f} bits at most, but {LEAST_BITS} withstand guessing"

@@ -60,7 +60,7 @@ _TLOG = TlogLimits()
 
 @dataclass(frozen=True, slots=True)
 class Settings(BridgeSettings):
-    """The settings of a daemon. Without `state_dir` nothing is stored.
+    """The settings of a daemon. Without `state_dir` it does not store anything.
 
     `access`: write permission per link, by its address as text; links not in it are open. `sources`: where each given
     key was found ("FILE:LINE", or a flag). `zenoh` None: not used. `web` None: no status page.

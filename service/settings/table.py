@@ -13,7 +13,7 @@ from service.settings.settings import Settings
 
 
 def _notes(kind: type) -> Iterator[tuple[Field[Any], Any, tuple[Any, ...]]]:
-    """Each annotated field, with its type (without None) and its notes; those of the bridge come last."""
+    """Each annotated field, with the type (without None) and its notes. Those of the bridge come last."""
     hints = get_type_hints(kind, include_extras=True)
     for field in sorted(fields(kind), key=lambda each: bool(each.kw_only)):
         if get_origin(hint := hints[field.name]) is Annotated:

@@ -73,7 +73,7 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
 
 
 def signing_access(path: Path) -> WriteAccess:
-    """Access with the key whose passphrase is in a file; AddressError if it cannot be used."""
+    """Access with the key whose passphrase is in a file. Raises AddressError if it cannot be used."""
     passphrase = read_passphrase(path)
     weak = weakness(passphrase)
     return WriteAccess(key_from_passphrase(passphrase), weak_key=None if weak is None else f"the key in {path} {weak}")

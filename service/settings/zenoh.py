@@ -11,7 +11,7 @@ from typing import Annotated
 from payloads.names import DEFAULT_PREFIX, check_name, host_name
 from service.settings.key import Example, Unfit, file_name, several, text
 
-#: Over a network with a port; or a path, as of a serial port.
+#: Over a network with a port, or a path, as of a serial port.
 _ENDPOINT = re.compile(r"(?:tcp|udp|tls|quic|ws)/[^/]+:\d{1,5}(?:[?#].*)?|(?!tcp|udp|tls|quic|ws)[a-z-]+/.+")
 #: The value that allows commands without authentication.
 I_KNOW = "I know"

@@ -52,7 +52,7 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
             except zenoh.ZError as error:
                 raise ZenohSettingsError(f"zenoh.{setting} cannot be used: {in_short(error)}") from error
     if json.loads(config.get_json("mode")) is None:
-        # Peers that have only a router in common do not see each other; every session sees a client.
+        # Peers that have only a router in common do not see each other. Every session sees a client.
         listens = all_endpoints(json.loads(config.get_json("listen/endpoints")))
         config.insert_json5("mode", '"peer"' if listens else '"client"')
     if settings.commands or settings.mavlink_in:
@@ -82,7 +82,7 @@ def _require_authentication(settings: ZenohSettings, config: zenoh.Config) -> No
 
 
 def _without_authentication(config: zenoh.Config) -> str | None:
-    """How a session can be reached without authentication; None if it cannot."""
+    """How a session can be reached without authentication, or None if it cannot."""
 
     def setting(key: str) -> Any:
         return json.loads(config.get_json(key))

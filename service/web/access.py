@@ -34,7 +34,7 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' {};"
     " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-#: The connection carries no second request (service.web.connection_limit).
+#: The connection does not carry a second request (service.web.connection_limit).
 _HEADERS = {
     b"x-content-type-options": b"nosniff",
     b"referrer-policy": b"no-referrer",
@@ -111,7 +111,7 @@ def _check_body(request: Request, max_body: int) -> None:
 
 @contextmanager
 def refusing(kind: type[Exception], status: HTTPStatus, sentence: Callable[[str], str] = str) -> Iterator[None]:
-    """Respond to such an error with a status, and a sentence made of its reason."""
+    """Respond to such an error with a status, and a sentence made of the reason."""
     try:
         yield
     except kind as error:

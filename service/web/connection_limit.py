@@ -3,7 +3,7 @@
 
 A connection carries one request and is closed after a few seconds. If there are too many, the address with the most
 connections loses the oldest of them. Requests take turns between addresses, so many hosts cannot keep the page from
-another one.
+another.
 """
 
 import asyncio
@@ -39,7 +39,7 @@ class ConnectionLimit:
         self._timer: asyncio.TimerHandle | None = None
 
     def enter(self, address: str, connection: "BoundedConnection") -> None:
-        """Take a connection; if there are too many, the oldest one of the host with the most is closed."""
+        """Take a connection. If there are too many, the oldest one of the host with the most is closed."""
         host = _host(address)
         if sum(map(len, self._open.values())) >= MAX_CONNECTIONS:
             largest = max(self._open, key=lambda each: (len(self._open[each]), each == host))
@@ -50,7 +50,7 @@ class ConnectionLimit:
         self._waiting.setdefault(host, deque()).append(connection)
 
     def serve(self, now: float) -> float | None:
-        """Begin the connections whose turn it is; the time of the next turn, None if no connection waits."""
+        """Begin the connections whose turn it is. The time of the next turn, None if no connection waits."""
         while self._waiting:
             free_at = self._used_until - (MAX_AT_ONCE - 1) * _TURN_S
             if free_at > now:

@@ -135,7 +135,7 @@ class _State(Collector):
 
 
 def vehicle_gauges(report: VehicleReport) -> Mapping[str, tuple[str, float | None]]:
-    """Meaning and value by name; those without a value are left out."""
+    """Meaning and value by name. Those without a value are left out."""
     return {
         "armed": ("1 while it is armed.", report.status.armed),
         "battery_volts": ("Battery.", report.battery.voltage_v),

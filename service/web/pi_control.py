@@ -59,7 +59,7 @@ def check_disarmed(daemon: Daemon) -> None:
 
 
 class PiControl:
-    """One request at a time. Its reply is fetched later: it may take longer than a connection lasts."""
+    """One request at a time. The reply is fetched later: it may take longer than a connection lasts."""
 
     def __init__(self, daemon: Daemon, writer: MissionWriter) -> None:
         self._daemon = daemon
@@ -84,7 +84,7 @@ class PiControl:
         self._drop_package()
 
     async def _show(self, _request: Request) -> Response:
-        """The request begun last, and its reply."""
+        """The request begun last, and the reply."""
         return json_reply(self._job)
 
     async def _begin(self, request: Request) -> Response:

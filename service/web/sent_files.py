@@ -46,7 +46,7 @@ class MissionWriter:
         self.state: Json | None = None
 
     def begin(self, what: str, write: Callable[[Progress], Awaitable[Json]], unit: str = "records") -> str:
-        """Start writing; returns the write's id: the page finds its own result by it. Refused while one runs.
+        """Start writing. Returns the write's id: the page finds its own result by it. Refused while one runs.
 
         unit: what `write` counts as its progress.
         """
@@ -62,7 +62,7 @@ class MissionWriter:
             raise HTTPException(HTTPStatus.CONFLICT, "Something else is being written: wait until it has finished.")
 
     async def close(self) -> None:
-        """Stop waiting for the result; the daemon itself has ended the transfer."""
+        """Stop waiting for the result. The daemon itself has ended the transfer."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -84,7 +84,7 @@ class MissionWriter:
 
 
 class SentFiles:
-    """The body of a request is the file; the query has its name."""
+    """The body of a request is the file. The query has its name."""
 
     def __init__(self, api: DaemonApi, writer: MissionWriter) -> None:
         self._api = api

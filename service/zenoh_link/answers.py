@@ -167,7 +167,7 @@ class CommandQueries:
         except (ValueError, LookupError, TypeError) as error:
             raise QueryRefused(_LOG_FORM) from error
         piece = await self._logs.read(str(name), start)
-        # MAVLink halves; its base64 form is a third longer.
+        # MAVLink halves. Its base64 form is a third longer.
         data = base64.b64encode(await asyncio.to_thread(zlib.compress, piece, 9)).decode()
         return {"result": {"start": start, "size": len(piece), "data": data}}
 

@@ -39,7 +39,7 @@ class SessionJoined(BridgeEvent):
 
 
 class SessionLeft(BridgeEvent):
-    """Its connection ended."""
+    """The connection ended."""
 
     name_in_log = "zenoh.left"
     neighbour: str

@@ -37,7 +37,7 @@ class MavlinkLink:
         session.declare_subscriber(name, zenoh.handlers.Callback(self._arrived, indirect=False))
 
     def read(self, *, is_read: bool) -> None:
-        """mavlink/out got its first subscriber, or lost the last one."""
+        """mavlink/out got the first subscriber, or lost the last."""
         if is_read:
             self._events.add_default_peer(_READERS)
         else:

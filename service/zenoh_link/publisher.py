@@ -37,7 +37,7 @@ class Publisher:
         self.failed = 0
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str) -> None:
-        """Declare a key's publisher; `name`: the full key. Called on the session's thread."""
+        """Declare a key's publisher. `name`: the full key. Called on the session's thread."""
         if key.kept:
             self._publishers[key.suffix] = self._declare_kept(session, key, name)
             return

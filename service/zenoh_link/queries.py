@@ -34,7 +34,7 @@ class QueryRefused(Exception):
 
 
 class Question:
-    """One query waiting for its reply. `name`: the full key."""
+    """One query waiting for the reply. `name`: the full key."""
 
     def __init__(self, query: zenoh.Query, key: ZenohKey, name: str, payloads: Payloads, thread: SessionThread) -> None:
         self._query = query
@@ -89,7 +89,7 @@ class Queries:
         self._places = {kind: threading.Semaphore(most) for kind, most in _MAX_AT_ONCE.items()}
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str, answerer: Answerer) -> None:
-        """Declare the queryable of one key; `name`: the full key. Called on the session's thread."""
+        """Declare the queryable of one key. `name`: the full key. Called on the session's thread."""
         places, most = self._places[key.query_kind], _MAX_AT_ONCE[key.query_kind]
 
         def asked(query: zenoh.Query) -> None:

@@ -52,7 +52,7 @@ class SampleRates:
         self._is_metered = is_metered
         self._paces: defaultdict[Group, _Pace] = defaultdict(lambda: _Pace(_CHANGED_S))
         self._state, self._overview = _Pace(_IDLE_S), _Pace(_OVERVIEW_S)
-        #: Each group's last sample, and when the next one goes out even if it is nearly the same.
+        #: Each group's last sample, and when the next goes out even if it is nearly the same.
         self._last: dict[Group, tuple[Any, float]] = {}
         #: Groups whose newest sample came too early to be sent.
         self.held_back: set[Group] = set()
@@ -80,7 +80,7 @@ class SampleRates:
         return self._overview.admits(marks, now)
 
     def _is_news(self, group: Group, sample: Any, now: float) -> bool:
-        """True if a sample differs noticeably from the last one, or that one is long ago."""
+        """True if a sample differs noticeably from the last, or that one is long ago."""
         last, until = self._last[group]
         return now >= until or any(
             _differs(getattr(sample, field), getattr(last, field), step) for field, step in _CHANGES[group].items()
@@ -88,7 +88,7 @@ class SampleRates:
 
 
 def _differs(value: Any, before: Any, step: float) -> bool:
-    """True if a number, or any of several, has changed by `step`; other values count any change."""
+    """True if a number, or any of several, has changed by `step`. Other values count any change."""
     if value == before:
         return False
     if isinstance(value, int | float) and isinstance(before, int | float):

@@ -58,7 +58,7 @@ class SessionThread:
         self._thread.start()
 
     def submit(self, job: Job, kind: JobKind = JobKind.SAMPLE) -> None:
-        """Run a job on the thread; if too many are waiting, a reply is dropped, and a sample displaces the oldest."""
+        """Run a job on the thread. If too many are waiting, a reply is dropped, and a sample displaces the oldest."""
         with self._wake:
             if len(self._jobs) >= kind.value:
                 self.dropped += 1

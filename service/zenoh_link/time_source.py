@@ -15,7 +15,7 @@ _TOLERANCE_S = 0.5
 
 
 class SampleClock:
-    """The Pi's clock, corrected while it is wrong and the flight controller has the time from its GPS.
+    """The Pi's clock, corrected while it is wrong and the flight controller has the time from the GPS.
 
     `now`: the monotonic time of readings, s.
     """
@@ -27,7 +27,7 @@ class SampleClock:
         self._epoch_s: float | None = None
 
     def unix_s(self) -> float:
-        """Seconds since 1970 (UTC), in milliseconds: a Pi's clock is no better, and each digit costs data."""
+        """Seconds since 1970 (UTC), in milliseconds: a Pi's clock is not a better, and each digit costs data."""
         return round(time.time() if self._epoch_s is None else self._epoch_s + self._now(), 3)
 
     def source(self, vehicle: Vehicle) -> str:

@@ -31,14 +31,14 @@ class ChipFlash(Protocol):
         """Bytes at an offset."""
 
     def erase(self, page: int, now: float) -> float:
-        """Erase a page; the time that it takes."""
+        """Erase a page. The time that it takes."""
 
     def program(self, at: int, data: bytes, now: float) -> float:
-        """Program bytes; the time that it takes."""
+        """Program bytes. The time that it takes."""
 
 
 class BootLoader:
-    """Runs from a reset until `on_go` is called with the time of the program's start; the ACK has then been sent."""
+    """Runs from a reset until `on_go` is called with the time of the program's start. The ACK has then been sent."""
 
     def __init__(self, flash: ChipFlash, on_go: Callable[[float], None]) -> None:
         self._flash = flash
@@ -118,7 +118,7 @@ class BootLoader:
                 self._on_go(self._tx_free_at)
 
     def _take(self, count: int) -> Generator[None, int, bytes | None]:
-        """Bytes and their checksum; None if that is wrong, which is refused."""
+        """Bytes and their checksum, or None if that is wrong, which is refused."""
         data = bytearray()
         for _ in range(count):
             data.append((yield))

@@ -9,7 +9,7 @@ class FarEnd(Protocol):
 
     @property
     def baud(self) -> int:
-        """Its current speed."""
+        """The current speed."""
 
     def power_on_booted(self, now: float) -> None:
         """Begin."""
@@ -21,4 +21,4 @@ class FarEnd(Protocol):
         """The bytes sent until `now` since the last call."""
 
     def next_wakeup(self, now: float) -> float:
-        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
+        """The time for the next call of `advance`, or infinity if nothing will happen by itself."""

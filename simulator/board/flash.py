@@ -33,7 +33,7 @@ class NorFlash:
         return bytes(self._memory[offset : offset + size])
 
     def erase(self, page: int, seconds: float) -> None:
-        """Set a page to ones; FlashError if that fails."""
+        """Set a page to ones. Raises FlashError if that fails."""
         start = page * PAGE_SIZE
         if self._begin(seconds):
             # An interrupted erase has set only some bits: here those of every other byte.
@@ -42,7 +42,7 @@ class NorFlash:
         self._end(self.read(start, PAGE_SIZE) == bytes((ERASED,)) * PAGE_SIZE)
 
     def program(self, offset: int, data: bytes, seconds: float) -> None:
-        """Clear bits; FlashError if the result is not `data`, for example because the page was not erased."""
+        """Clear bits. Raises FlashError if the result is not `data`, for example because the page was not erased."""
         if self._begin(seconds):
             for index in range(len(data) // 2 if self._is_cut else len(data)):
                 self._memory[offset + index] &= data[index]
@@ -54,7 +54,7 @@ class NorFlash:
         return seconds
 
     def _begin(self, seconds: float) -> bool:
-        """Count an operation; False if the flash controller does not execute it."""
+        """Count an operation. Returns False if the flash controller does not execute it."""
         self.operations += 1
         self._busy_seconds += seconds
         if self._faults.power_cut_at_flash_operation:

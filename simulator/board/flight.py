@@ -42,7 +42,7 @@ class FlightState:
 
 @dataclass(frozen=True, slots=True)
 class Craft:
-    """The craft at one moment. `boxes`: the pilot's switches but ARM, one bit each; `home`: where it was armed.
+    """The craft at one moment. `boxes`: the pilot's switches but ARM, one bit each. `home`: where it was armed.
 
     `acc`: the accelerometer, 512 for 1 g: forward, left, up.
     """

@@ -57,7 +57,7 @@ class MspBoard(SimulatedBoard):
 
     @property
     def baud(self) -> int:
-        """The speed of its port; any value for a socket, which has none."""
+        """The speed of the port. Any value for a socket, which has none."""
         return self.options.baud or _NO_SPEED
 
     @property

@@ -49,7 +49,7 @@ class MspReceiver:
     """Finds requests as the firmware does: it trusts a header's size and never rescans.
 
     `buffer_size`: the largest payload; a larger size byte is refused. The stock firmware takes 64 and has no
-    timeout: after a truncated frame it consumes the next one's bytes until its count is reached.
+    timeout: after a truncated frame it consumes the next's bytes until its count is reached.
     """
 
     def __init__(self, buffer_size: int = _STOCK_BUFFER) -> None:
@@ -75,7 +75,7 @@ class MspReceiver:
         return bytes(self._buffer)
 
     def overwrite(self, data: bytes) -> None:
-        """The extension puts its replies into the same buffer."""
+        """The extension puts the replies into the same buffer."""
         self._buffer[: len(data)] = data
 
     def forget(self) -> None:
@@ -83,7 +83,7 @@ class MspReceiver:
         self._state = 0
 
     def push(self, byte: int) -> tuple[int, bytes] | None:
-        """Take a byte; returns command and payload if it completes a request with a valid checksum."""
+        """Take a byte. Returns command and payload if it completes a request with a valid checksum."""
         state = self._state
         if state < 3:
             self._state = state + 1 if byte == b"$M<"[state] else 0

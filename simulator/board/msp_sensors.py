@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii's commands and telemetry replies; INAV's, Betaflight's and baseflight's differ only in details."""
+"""MultiWii's commands and telemetry replies. INAV's, Betaflight's and baseflight's differ only in details."""
 
 import struct
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ _STATUS_FLAGS = (1 << 32) - 1
 
 
 class MspCommand(IntEnum):
-    """MultiWii's commands; each firmware has some of them."""
+    """MultiWii's commands. Each firmware has some of them."""
 
     IDENT = 100
     STATUS = 101
@@ -71,7 +71,7 @@ class SensorReplies:
     currents_ca: tuple[int, int] = (0, 1250)
 
     def payload(self, command: int, craft: Craft) -> bytes | None:
-        """A reply's payload; None for other commands."""
+        """A reply's payload, or None for other commands."""
         flight, armed = craft.flight, craft.armed
         match command:
             case MspCommand.STATUS:

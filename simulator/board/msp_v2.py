@@ -25,7 +25,7 @@ class MspReceiverV2(MspReceiver):
         return bool(self._frame) or super().in_frame
 
     def push(self, byte: int) -> tuple[int, bytes] | None:
-        """Take a byte; returns command and payload if it completes a request with a valid checksum."""
+        """Take a byte. Returns command and payload if it completes a request with a valid checksum."""
         if self._frame:
             self._frame.append(byte)
             return self._look()

@@ -50,7 +50,7 @@ class Error(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class NavStatus:
-    """`number`: of the waypoint, from 1; `heading`: the target heading, degrees."""
+    """`number`: of the waypoint, from 1. `heading`: the target heading, degrees."""
 
     mode: Mode
     state: State

@@ -13,7 +13,7 @@ FLAG_LAST, FLAG_HOME = 0xA5, 0x48
 
 @dataclass(frozen=True, slots=True)
 class NavWaypoint:
-    """`action` may be any byte. Degrees * 1e7 and centimetres; the meaning of p1 to p3 depends on the action."""
+    """`action` may be any byte. Degrees * 1e7 and centimetres. The meaning of p1 to p3 depends on the action."""
 
     action: int = NavAction.RTH
     lat_e7: int = 0
@@ -31,7 +31,7 @@ class NavWaypoint:
 
 
 def unpack_waypoint(payload: bytes) -> tuple[int, NavWaypoint]:
-    """Number and waypoint; struct.error unless there are 21 bytes."""
+    """Number and waypoint. Raises struct.error unless there are 21 bytes."""
     number, *fields = _LAYOUT.unpack(payload)
     return number, NavWaypoint(*fields)
 

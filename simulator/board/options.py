@@ -26,7 +26,7 @@ class Tree(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimOptions:
-    """A board and its firmware; the defaults are Harakiri's own, times as measured on the emulated board."""
+    """A board and its firmware. The defaults are Harakiri's own, times as measured on the emulated board."""
 
     seed: int = 0
     baud: int = 115200

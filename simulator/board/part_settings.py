@@ -26,11 +26,11 @@ class PartSettings:
             at += len(reply)
 
     def read(self, command: int) -> bytes | None:
-        """The payload of a reply; None for other commands."""
+        """The payload of a reply, or None for other commands."""
         return self._replies.get(command)
 
     def write(self, command: int, payload: bytes) -> bool:
-        """Carry out a setter, even while armed; False if it is another command, or the payload is too short."""
+        """Carry out a setter, even while armed. Returns False if it is another command, or the payload is too short."""
         if command == _SET_MODE_RANGE and _MODE_RANGES in self._replies:
             ranges = bytearray(self._replies[_MODE_RANGES])
             at = payload[0] * _RANGE_SIZE if len(payload) > _RANGE_SIZE else len(ranges)

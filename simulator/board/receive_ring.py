@@ -8,7 +8,7 @@ from simulator.board.options import Counters
 _BITS_PER_BYTE = 10
 # Times are floats in seconds: with this tolerance a byte that ends exactly now has ended.
 EPSILON_BYTES = 1e-3
-#: The time that a finished frame may wait for the next one, to save wake-ups at both ends.
+#: The time that a finished frame may wait for the next, to save wake-ups at both ends.
 GATHER_SECONDS = 0.004
 
 
@@ -40,7 +40,7 @@ class ReceiveRing:
             self._wire_free_at = start + len(data) * self._byte_time
 
     def next_arrival(self) -> float | None:
-        """The arrival time of the next unread byte; in the past if it is in the ring."""
+        """The arrival time of the next unread byte. In the past if it is in the ring."""
         if self._unread:
             return 0.0
         return self._wire[0][0] + self._byte_time if self._wire else None
@@ -50,7 +50,7 @@ class ReceiveRing:
         return self._wire_free_at
 
     def read(self, now: float) -> int | None:
-        """The next unread byte; None if there is none."""
+        """The next unread byte, or None if there is none."""
         if self._wire:
             self._leave_wire(now)
         unread = self._unread
@@ -59,7 +59,7 @@ class ReceiveRing:
         return unread.pop(0) if unread else None
 
     def arrive(self, now: float) -> int:
-        """Fill the ring; returns the number of unread bytes.
+        """Fill the ring. Returns the number of unread bytes.
 
         The firmware does not notice an overrun: it sees only the distance between the DMA's position and its own.
         """
@@ -75,7 +75,7 @@ class ReceiveRing:
         self._unread.clear()
 
     def keep_arrived(self, now: float) -> None:
-        """Keep bytes that arrived unread until `now`; an overrun is then not counted against the client."""
+        """Keep bytes that arrived unread until `now`. An overrun is then not counted against the client."""
         self._leave_wire(now)
         self._drop_lapped()
 

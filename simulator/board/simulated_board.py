@@ -15,7 +15,7 @@ from simulator.board.traps import HazardWatch
 
 
 class Power(Enum):
-    """The state of the CPU. CRASHED ends only by the reset line or a power cycle, BOOTLOADER also by its host."""
+    """The state of the CPU. CRASHED ends only by the reset line or a power cycle, BOOTLOADER also by the host."""
 
     OFF = auto()
     BOOTING = auto()
@@ -43,7 +43,7 @@ class SimulatedBoard(ABC):
     @property
     @abstractmethod
     def baud(self) -> int:
-        """The current speed of its port."""
+        """The current speed of the port."""
 
     @property
     @abstractmethod
@@ -52,7 +52,7 @@ class SimulatedBoard(ABC):
 
     @property
     def protocol(self) -> Enum | None:
-        """The firmware's current protocol; None if it has only one, or does not run."""
+        """The firmware's current protocol, or None if it has only one, or does not run."""
         return None
 
     @property
@@ -61,7 +61,7 @@ class SimulatedBoard(ABC):
         """The mission records that the next boot would load."""
 
     def truth(self, _: float) -> Craft | None:
-        """The craft's true state; None while no firmware runs, and for a board without a simulated flight."""
+        """The craft's true state, or None while no firmware runs, and for a board without a simulated flight."""
         return None
 
     def power_on(self, now: float) -> None:
@@ -85,7 +85,7 @@ class SimulatedBoard(ABC):
             self._reset(now)
 
     def receive(self, data: bytes, now: float) -> None:
-        """Put bytes on the wire to the RX pin; they arrive at line rate."""
+        """Put bytes on the wire to the RX pin. They arrive at line rate."""
         self._run_until(now)
         data = self._disturb(data)
         self.counters.hazard_runs += self._hazards.runs_in(data)
@@ -99,7 +99,7 @@ class SimulatedBoard(ABC):
 
     @abstractmethod
     def next_wakeup(self, now: float) -> float:
-        """The time for the next call of `advance`; infinity if nothing will happen by itself."""
+        """The time for the next call of `advance`, or infinity if nothing will happen by itself."""
 
     @abstractmethod
     def _boot(self, now: float) -> None:

@@ -26,7 +26,7 @@ class Dialect:
     """The differences between them. `tails`: extra bytes after a command's usual payload.
 
     `constants`: the payloads of commands with a constant reply. `has_gps`: False for Betaflight's own simulator, which
-    is built without GPS and its messages. `settings`: the replies that setters change.
+    is built without GPS and the messages. `settings`: the replies that setters change.
     """
 
     habits: PortHabits

@@ -14,7 +14,7 @@ class TypedLine:
         self._line = bytearray()
 
     def type(self, byte: int) -> tuple[bytes, str | None]:
-        """Take a byte; returns its echo, and the line when it ends. Empty lines are ignored."""
+        """Take a byte. Returns its echo, and the line when it ends. Empty lines are ignored."""
         if byte in _ENTER and self._line:
             line, self._line = self._line.decode("ascii"), bytearray()
             return b"\r\n", line

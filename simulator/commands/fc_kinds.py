@@ -39,7 +39,7 @@ def new_eeprom(kind: str, options: MspOptions) -> bytearray:
 def make_board(
     kind: str, options: MspOptions | None = None, faults: Faults | None = None, eeprom: memoryview | None = None
 ) -> MspBoard:
-    """Create a board without power. `eeprom` outlives the board; None: a blank one."""
+    """Create a board without power. `eeprom` outlives the board, or None if a blank one."""
     options = options or MspOptions()
     if eeprom is None:
         eeprom = memoryview(new_eeprom(kind, options))

@@ -50,7 +50,7 @@ def run_image(
     weather: Weather | None = None,
     tempo: float = 1.0,
 ) -> None:
-    """Run a firmware until Ctrl-C; with `weather` in a craft that flies, at `tempo`. click.ClickException."""
+    """Run a firmware until Ctrl-C. With `weather` in a craft that flies, at `tempo`. click.ClickException."""
     image = read_image(path)
     flash = open_memory(state, b"\xff" * FLASH_SIZE, "name another file") if state else None
     board = _flying(image, flash, weather, tempo) if weather else _on_bench(image, flash, faults, seed)

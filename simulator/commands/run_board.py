@@ -19,7 +19,7 @@ from simulator.links.tcp_link import SimTcpLink
 class RunOptions:
     """The board's connections and scheduled events. Times in seconds.
 
-    `link`: of a pseudo-terminal; `tcp`: host and port; one of them is set. `control`: a Unix socket.
+    `link`: of a pseudo-terminal. `tcp`: host and port; one of them is set. `control`: a Unix socket.
     """
 
     link: Path | None = None
@@ -32,7 +32,7 @@ class RunOptions:
 
 
 async def run_board(board: SimulatedBoard, name: str, run_options: RunOptions, is_alive: Callable[[], bool]) -> None:
-    """Run it. click.ClickException if its link or address is not available."""
+    """Run it. click.ClickException if the link or address is not available."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

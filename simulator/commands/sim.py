@@ -46,7 +46,7 @@ _WITH_IMAGE = {
 }  # fmt: skip
 #: Options of a flight.
 _WITH_FLY = {"wind", "script", "speed"}
-#: Options of Harakiri and its mission extension, and of --image.
+#: Options of Harakiri and the mission extension, and of --image.
 _OF_THE_NAZE = {
     "tele_prot", "no_extension", "flash_stall", "program_stall", "wp_radius_cm", "core", "speed",
 }  # fmt: skip

@@ -75,7 +75,7 @@ class EmulatedNaze(SimulatedBoard):
     def _make_chip(self, program_size: int, seed: int) -> Chip:
         return Chip(self.flash, program_size, self.faults, self.counters, seed)
 
-    # -- its state -------------------------------------------------------------------------------------------
+    # -- the state -------------------------------------------------------------------------------------------
 
     @property
     def baud(self) -> int:

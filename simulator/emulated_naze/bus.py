@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The register blocks that the firmware uses rarely; the others are in C (`native/bus.c`, section 3.3)."""
+"""The register blocks that the firmware uses rarely. The others are in C (`native/bus.c`, section 3.3)."""
 
 import logging
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ _log = logging.getLogger(__name__)
 
 
 class Peripheral(Protocol):
-    """A register block. Offsets are multiples of four; a 16-bit access is one to the word's lower half."""
+    """A register block. Offsets are multiples of four. A 16-bit access is one to the word's lower half."""
 
     def reset(self) -> None:
         """Reset to the state after a chip reset."""
@@ -26,7 +26,7 @@ class Peripheral(Protocol):
 
 
 class Registers:
-    """A block whose registers only store written values; the base of those with behaviour."""
+    """A block whose registers only store written values. The base of those with behaviour."""
 
     def __init__(self) -> None:
         self.words: dict[int, int] = {}

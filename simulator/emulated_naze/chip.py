@@ -44,17 +44,17 @@ class I2cDevice(Protocol):
         """Handle being addressed, for reading or writing."""
 
     def read(self) -> int:
-        """Return its next byte."""
+        """Return the next byte."""
 
     def write(self, byte: int) -> None:
         """Receive a byte."""
 
 
 class Chip:
-    """`flash` is the flash's contents; its first `program_size` bytes are the program. NativeChipError.
+    """`flash` is the flash's contents. The first `program_size` bytes are the program. NativeChipError.
 
     Flash that the firmware writes must not share a page of 4 KB with the program: those pages are read-only. `devices`
-    are the chips on the I2C bus by address; without them the board is level and still.
+    are the chips on the I2C bus by address. Without them the board is level and still.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class Chip:
         self._pins.battery = converted
 
     def motors_us(self) -> tuple[int, ...]:
-        """The pulse length on each motor's pin, in the firmware's order; 0 before the timers run."""
+        """The pulse length on each motor's pin, in the firmware's order, or 0 before the timers run."""
         return tuple(self._library.chip_timer_register(self._native, timer, at) for timer, at in _MOTOR_PINS)
 
     # -- power and time --------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ class Chip:
         self._reset_outside()
 
     def reset(self) -> None:
-        """Reset as the firmware does: RAM keeps its contents."""
+        """Reset as the firmware does: RAM keeps the contents."""
         self._reset_outside()
         self._library.chip_reset(self._native)
 

@@ -25,7 +25,7 @@ class Console:
         self._on_time = on_time
 
     def run(self, seconds: float) -> bytes:
-        """Let time pass; the bytes that the board sent."""
+        """Let time pass. The bytes that the board sent."""
         end, sent = self.now + seconds, bytearray()
         while self.now < end - 1e-9:
             self.now = min(self.now + _STEP_S, end)
@@ -37,11 +37,11 @@ class Console:
         self.board.receive(data, self.now)
 
     def ask(self, command: int, payload: bytes = b"", timeout_s: float = 1.0) -> bytes | None:
-        """The reply's payload to an MSP request; None without one, or if it is refused."""
+        """The reply's payload to an MSP request, or None without one, or if it is refused."""
         return self.exchange(request(command, payload), command, timeout_s)
 
     def exchange(self, frame: bytes, command: int, timeout_s: float = 1.0) -> bytes | None:
-        """The payload of the reply to `command`, which `frame` requests; None without one, or if it is refused."""
+        """The payload of the reply to `command`, which `frame` requests, or None without one, or if it is refused."""
         parser = MspParser()
         self.send(frame)
         end = self.now + timeout_s

@@ -22,7 +22,7 @@ _ERASE_NS = 25_000_000
 class FlashController:
     """`memory` is the chip's contents. `stall` lets time pass while the core is stalled.
 
-    An operation is a page erased or a half-word programmed. `tear` decides its result after a power cut.
+    An operation is a page erased or a half-word programmed. `tear` decides the result after a power cut.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated board in a quadcopter: its motors carry it, its sensors feel it, and a GPS module is on USART2."""
+"""The emulated board in a quadcopter: its motors carry it, the sensors feel it, and a GPS module is on USART2."""
 
 import random
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ class FlyingNaze(EmulatedNaze):
         self._requested = self._is_pending = False
 
     def truth(self, now: float) -> Craft | None:
-        """Its true state; without the firmware's `boxes` and `home`."""
+        """Its true state. Without the firmware's `boxes` and `home`."""
         self._run_until(now)
         if self.power is not Power.RUNNING:
             return None

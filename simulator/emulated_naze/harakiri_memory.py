@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's state that no protocol reports, read from its RAM by the image's symbols, and from its flash."""
+"""Harakiri's state that no protocol reports, read from the RAM by the image's symbols, and from the flash."""
 
 from enum import Enum
 from typing import Protocol
@@ -56,7 +56,7 @@ class HarakiriMemory:
 
     @property
     def stored_records(self) -> list[bytes]:
-        """The list that the patched firmware would load at its next start."""
+        """The list that the patched firmware would load at the next start."""
         options = SimOptions()
         pages = self._flash[_SLOTS : _SLOTS + 2 * slot_pages(options.capacity) * PAGE_SIZE]
         slots = MissionSlots(NorFlash(pages, Faults()), options)

@@ -16,7 +16,7 @@ _BIAS = {0b01: (766, 713, 766), 0b10: (-766, -713, -766)}
 
 
 class Hmc5883l(RegisterChip):
-    """Measures a constant field; the last bit is noise from `noise`."""
+    """Measures a constant field. The last bit is noise from `noise`."""
 
     def __init__(self, noise: random.Random) -> None:
         super().__init__()
@@ -26,7 +26,7 @@ class Hmc5883l(RegisterChip):
         self._measured = _FIELD
 
     def begin(self, is_read: bool) -> None:
-        """Begin a transfer; all measurements of a read transfer are simultaneous."""
+        """Begin a transfer. All measurements of a read transfer are simultaneous."""
         super().begin(is_read)
         if is_read:
             field = _BIAS.get(self._registers[_CONFIGURATION_A] & 0b11) or self._field()

@@ -16,7 +16,7 @@ _DRIFT = (3, -2, 1)
 
 
 class Mpu6050(RegisterChip):
-    """Still and level; the last bits of its measurements are noise from `noise`."""
+    """Still and level. The last bits of its measurements are noise from `noise`."""
 
     def __init__(self, noise: random.Random) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class Mpu6050(RegisterChip):
         self._registers[_IDENTITY] = ADDRESS
 
     def begin(self, is_read: bool) -> None:
-        """Begin a transfer; all measurements of a read transfer are simultaneous."""
+        """Begin a transfer. All measurements of a read transfer are simultaneous."""
         super().begin(is_read)
         if is_read:
             self._measured = self._measure()

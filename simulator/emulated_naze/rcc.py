@@ -26,7 +26,7 @@ class Rcc(Registers):
         self._set_clocks()
 
     def read(self, offset: int) -> int:
-        """Read a word; each ready bit follows its enable bit."""
+        """Read a word. Each ready bit follows its enable bit."""
         value = super().read(offset)
         if offset == _CR:
             value |= (value & (_HSI_ON | _HSE_ON | _PLL_ON)) << 1

@@ -12,7 +12,7 @@ class RegisterChip:
         self._awaits_number = False
 
     def begin(self, is_read: bool) -> None:
-        """Begin a transfer; a write begins with the register number."""
+        """Begin a transfer. A write begins with the register number."""
         self._awaits_number = not is_read
 
     def read(self) -> int:

@@ -49,7 +49,7 @@ class SkyCompass(hmc5883l.Hmc5883l):
 
 
 class SkyBarometer(ms5611.Ms5611):
-    """Measures the air pressure at its height."""
+    """Measures the air pressure at the height."""
 
     def __init__(self, noise: random.Random, sky: Sky, advance: Callable[[], None]) -> None:
         super().__init__(noise)

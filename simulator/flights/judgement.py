@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Judges by the craft's true track whether a mission was flown as its list says.
+"""Judges by the craft's true track whether a mission was flown as the list says.
 
 The limits: a place within its radius + 2 m, 3 m of overshoot where it brakes, 1.5 s of a time, 10 degrees of a turn, a
-place that is held within its radius + 4 m and its height within 1.5 m, a landing within 6 m of where the descent began.
+place that is held within its radius + 4 m and the height within 1.5 m, a landing within 6 m of where the descent began.
 They include the GPS module's error of 1 m.
 
-A flight is out of bounds, however it ends, 40 m from all legs of its list, at 12 m/s or leaning 50 degrees.
+A flight is out of bounds, however it ends, 40 m from all legs of the list, at 12 m/s or leaning 50 degrees.
 """
 
 from dataclasses import dataclass, field
@@ -77,7 +77,7 @@ class Extremes:
 
     @property
     def problem(self) -> str:
-        """What no flight may do, whatever its sensors say; "" if it did not."""
+        """What no flight may do, whatever the sensors say; "" if it did not."""
         if self.has_crashed:
             return "crashed"
         if self.off_legs_m > _FLYAWAY_M or self.fastest > _FASTEST or self.steepest_deg > _STEEPEST_DEG:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A real flight of a mission from the bridge's telemetry log, as a sortie: it is judged like a simulated one.
 
-The track is the board's own: its GPS, its height and its attitude.
+The track is the board's own: the GPS, the height and the attitude.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ from simulator.flights.track import Sample, Track
 from simulator.sky.earth import Place
 
 _EVERY_S = 0.1
-#: A flight that ends so has ended by itself; else the log does.
+#: A flight that ends so has ended by itself, else the log does.
 _ENDED = (FlightPhase.OFF, FlightPhase.DONE, FlightPhase.STAY, FlightPhase.HELD)
 
 
@@ -86,7 +86,7 @@ def logged_sortie(log: bytes, records: Sequence[WpRecord]) -> Sortie:
 
 
 def _messages(log: bytes) -> Iterator[tuple[float, Message]]:
-    """Each message with its time, s; a record that is cut off ends the log."""
+    """Each message with its time, s. A record that is cut off ends the log."""
     at = 0
     while at + 10 < len(log):
         start = at + 8

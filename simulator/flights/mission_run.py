@@ -53,7 +53,7 @@ class MissionRun:
 
     @property
     def compass(self) -> str:
-        """What the board has found out about its compass, to end a sentence."""
+        """What the board has found out about the compass, to end a sentence."""
         found = [report.progress.compass for report in self.reports if report.progress.compass is not None]
         return f"; the compass was found {found[-1]:.0f} degrees off" if found and abs(found[-1]) >= 1 else ""
 
@@ -109,7 +109,7 @@ def fly_mission(pilot: Pilot, records: Sequence[WpRecord], intervene: Interventi
 
 
 def _ends(progress: FlightProgress, has_landed: bool) -> float | None:
-    """The time to keep watching if the flight has ended; None if it continues."""
+    """The time to keep watching if the flight has ended, or None if it continues."""
     if has_landed:
         return 1.0
     if progress.state in (FlightPhase.DONE, FlightPhase.STAY):

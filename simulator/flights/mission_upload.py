@@ -26,7 +26,7 @@ class UnfitImageError(Exception):
 
 
 def progress_of(console: Console) -> FlightProgress | None:
-    """The board's own report on its mission flight; None without one."""
+    """The board's own report on the mission flight, or None without one."""
     reply = console.exchange(FLIGHT_REQUEST, FLIGHT)
     return None if reply is None else decode_flight(reply)
 

@@ -28,7 +28,7 @@ class SortieError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Sortie:
-    """A flight, and its verdict."""
+    """A flight, and the verdict."""
 
     run: MissionRun
     place: Place

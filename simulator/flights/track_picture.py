@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture of a flight as SVG: from above with the mission's places and their radii, and its height over time."""
+"""A picture of a flight as SVG: from above with the mission's places and their radii, and the height over time."""
 
 from collections.abc import Iterable, Sequence
 from html import escape

@@ -267,7 +267,7 @@ class InavFirmware(MspFirmware):
         flight = self._craft.state()
         match number:
             case 0:
-                # With a fix, which this craft always has, home is its position until it arms.
+                # With a fix, which this craft always has, home is the position until it arms.
                 waypoint = NavWaypoint(FAKE.action, *(self._home or self._craft.position), _FIELD_ALTITUDE_CM)
             case 255:
                 waypoint = NavWaypoint(FAKE.action, flight.lat_e7, flight.lon_e7, round(flight.altitude_m * 100))

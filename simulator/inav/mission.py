@@ -58,7 +58,7 @@ class InavMission:
 
     @property
     def lands_after_rth(self) -> bool:
-        """True if a mission's RTH ends with a landing. The last waypoint's p1 decides, regardless of its action."""
+        """True if a mission's RTH ends with a landing. The last waypoint's p1 decides, regardless of the action."""
         return self[self.count - 1].p1 > 0
 
     def read(self, number: int, armed: bool) -> NavWaypoint:
@@ -69,7 +69,7 @@ class InavMission:
         return replace(waypoint, p1=wrap16(waypoint.p1 + 1)) if waypoint.action == NavAction.JUMP else waypoint
 
     def write(self, number: int, waypoint: NavWaypoint) -> None:
-        """Store a waypoint if it is valid; the flight controller acknowledges it either way."""
+        """Store a waypoint if it is valid. The flight controller acknowledges it either way."""
         if not 1 <= number <= CAPACITY or waypoint.action not in _STORED_ACTIONS:
             return
         if number not in (1, self.count + 1):
@@ -84,7 +84,7 @@ class InavMission:
         self.is_valid = waypoint.flag == FLAG_LAST
 
     def save(self) -> bool:
-        """Copy the list into the EEPROM; False if it is not complete."""
+        """Copy the list into the EEPROM. Returns False if it is not complete."""
         if not self.is_valid:
             return False
         for number in range(1, CAPACITY + 1):
@@ -112,7 +112,7 @@ class InavMission:
         return self.is_valid
 
     def follow_selection(self) -> None:
-        """Load the selected mission; an armed INAV does so outside of its waypoint mode."""
+        """Load the selected mission. An armed INAV does so outside of its waypoint mode."""
         if self._missions >= 2 and self._loaded != self.selected:
             self._load_selected()
 
@@ -142,7 +142,7 @@ class InavMission:
         return True
 
     def is_near(self, position: tuple[int, int], within_m: int) -> bool:
-        """True if INAV allows arming here: the first waypoint, whatever its action, is near. 0 m: anywhere."""
+        """True if INAV allows arming here: the first waypoint, whatever the action, is near. 0 m: anywhere."""
         first = self[0]
         is_at_home = first.flag == FLAG_HOME or not (first.lat_e7 or first.lon_e7)
         if not (self.count and within_m) or is_at_home:

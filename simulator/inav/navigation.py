@@ -88,7 +88,7 @@ class InavNavigation:
         self._home = self._craft.position
 
     def disarm(self) -> None:
-        """Stop; the mission restarts after the next arming."""
+        """Stop. The mission restarts after the next arming."""
         self.phase = Phase.IDLE
         self._restarts = True
         self.index = 0

@@ -27,7 +27,7 @@ _SAFEHOMES, _APPROACHES, _ZONES, _VERTICES = 8, 17, 63, 126
 _SAFEHOME_SIZE, _APPROACH_SIZE = 9, 14
 #: Type, shape, minimum and maximum altitude in cm, above sea level or not, action, number of vertices.
 _ZONE = struct.Struct("<BBiiBBB")
-#: Zone, number in it, latitude, longitude. A circle's second vertex has its radius in cm as latitude.
+#: Zone, number in it, latitude, longitude. A circle's second vertex has the radius in cm as latitude.
 _VERTEX = struct.Struct("<bBii")
 _PLACE = struct.Struct("<BBii")
 _FREE = _VERTEX.pack(-1, 0, 0, 0)
@@ -43,7 +43,7 @@ PLACES_SIZE = (
 
 
 class PartialReplyError(Exception):
-    """INAV's handler failed after it had written a part of its reply, which the error frame then has."""
+    """INAV's handler failed after it had written a part of the reply, which the error frame then has."""
 
     def __init__(self, payload: bytes) -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class InavPlaces:
         self._stored[:] = b"\1" + self._features.to_bytes(4, "little") + content
 
     def answer(self, command: int, payload: bytes, behind: bytes = b"") -> bytes | None:
-        """The payload of the reply; None: an error, also for other commands. PartialReplyError.
+        """The payload of the reply, or None if an error, also for other commands. PartialReplyError.
 
         `behind`: the bytes of earlier requests that are still in the receive buffer, behind the payload.
         """

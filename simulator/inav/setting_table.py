@@ -122,5 +122,5 @@ SETTINGS = tuple(
     InavSetting(name, 1000 + section, kind, section, minimum, maximum, index, choices, value)
     for index, (name, kind, section, minimum, maximum, value, choices) in enumerate(_ROWS)
 )
-#: In the order of PID_V2, which has the same values as its first bytes.
+#: In the order of PID_V2, which has the same values as the first bytes.
 PIDS = tuple(f"mc_{letter}_{axis}" for axis in ("roll", "pitch", "yaw") for letter in ("p", "i", "d", "cd"))

@@ -58,7 +58,7 @@ class InavSettings:
             self._replies[EZ_TUNE] = bytes((0, 110, 0, 110, *(100,) * 6)) + snappiness
 
     def read(self, command: int) -> bytes | None:
-        """The payload of a reply; None for other commands."""
+        """The payload of a reply, or None for other commands."""
         reply = self._replies.get(command)
         if command == PID_V2 and reply is not None:
             return bytes(int(self._settings[name].value) for name in PIDS) + reply[len(PIDS) :]
@@ -71,7 +71,7 @@ class InavSettings:
         self._settings[name] = self._settings[name]._replace(value=value)
 
     def answer(self, command: int, payload: bytes) -> bytes | None:
-        """The payload of the reply to a request about one setting; None: an error."""
+        """The payload of the reply to a request about one setting, or None if an error."""
         setting, data = self._find(payload)
         if setting is None:
             return None
@@ -123,7 +123,7 @@ class InavSettings:
         return True
 
     def write(self, command: int, payload: bytes) -> bool:
-        """Carry out a setter; False if it is another command, or its payload has another length."""
+        """Carry out a setter. Returns False if it is another command, or the payload has another length."""
         if command == SET_MODE_RANGE and len(payload) == 1 + _RANGE_SIZE and payload[0] < _RANGES:
             ranges = bytearray(self._replies[MODE_RANGES])
             ranges[payload[0] * _RANGE_SIZE : (payload[0] + 1) * _RANGE_SIZE] = payload[1:]
@@ -140,5 +140,5 @@ class InavSettings:
 
 
 def _text(stored: bytes) -> str:
-    """The whole field of a text: INAV keeps the bytes after its end."""
+    """The whole field of a text: INAV keeps the bytes after the end."""
     return stored.decode("ascii", "replace").rstrip("\0")

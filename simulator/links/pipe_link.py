@@ -18,7 +18,7 @@ class SimLink:
         self._pump: Pump | None = None
 
     async def start(self) -> socket.socket:
-        """Switch on the board, booted; returns the non-blocking far end, which the caller must close.
+        """Switch on the board, booted. Returns the non-blocking far end, which the caller must close.
 
         Called again it reconnects the port: an older far end reads end-of-file, the board keeps running.
         """
@@ -32,7 +32,7 @@ class SimLink:
         return far
 
     def stop(self) -> None:
-        """Pull the plug: the far end reads end-of-file. The board keeps its power and its state."""
+        """Pull the plug: the far end reads end-of-file. The board keeps the power and the state."""
         if self._pump and self._near:
             self._pump.stop()
             self._near.close()

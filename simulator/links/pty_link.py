@@ -61,12 +61,12 @@ class PtyLink:
             if isinstance(error, FileExistsError):
                 raise PlugError(f"{self._path} already exists: use another --link, or remove it") from error
             raise PlugError(f"{self._path} cannot be created: {error.strerror}") from error
-        # Our own copy of the far end stays open, so the terminal keeps its settings between clients.
+        # Our own copy of the far end stays open, so the terminal keeps the settings between clients.
         self._pump = Pump(self._board, self._near, self._loop, far_baud=self._far_baud)
         self._pump.start()
 
     def unplug(self) -> None:
-        """Remove the terminal: a client that has it open sees a hang-up. The board keeps its power."""
+        """Remove the terminal: a client that has it open sees a hang-up. The board keeps the power."""
         if self._pump:
             self._pump.stop()
             self._pump = None
@@ -83,7 +83,7 @@ class PtyLink:
         return self._path.readlink() if self._path.is_symlink() else self._path
 
     def _is_anothers(self) -> bool:
-        """True if a running simulator owns the link. Terminal numbers are reused: an older link led to another one."""
+        """True if a running simulator owns the link. Terminal numbers are reused: an older link led to another."""
         try:
             if self._leads_to().parent != _TERMINALS:
                 return False

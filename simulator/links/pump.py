@@ -17,7 +17,7 @@ _LONGEST_SLEEP = 0.25
 class Pump:
     """Owns only its timer and reader: `fd` is non-blocking and stays the caller's.
 
-    `far_baud` returns the speed set at the other end; without it both ends always agree. `on_hangup` is
+    `far_baud` returns the speed set at the other end. Without it both ends always agree. `on_hangup` is
     called when the other end is gone.
     """
 
@@ -42,7 +42,7 @@ class Pump:
         self.poke()
 
     def stop(self) -> None:
-        """Stop; afterwards the descriptor may be closed."""
+        """Stop. Afterwards the descriptor may be closed."""
         self._loop.remove_reader(self._fd)
         if self._timer:
             self._timer.cancel()

@@ -14,7 +14,7 @@ _LOOK_SECONDS = 0.1
 
 
 class SimTcpLink:
-    """One client is served at a time; further clients are connected but receive nothing until their turn.
+    """One client is served at a time. Further clients are connected but receive nothing until their turn.
 
     The port is open while `is_alive` returns True.
     """
@@ -39,7 +39,7 @@ class SimTcpLink:
             self._watch()
 
     def unplug(self) -> None:
-        """Disconnect all clients and close the port. The board keeps its power."""
+        """Disconnect all clients and close the port. The board keeps the power."""
         if self._look:
             self._look.cancel()
             self._look = None

@@ -111,7 +111,7 @@ class MultiWiiFirmware(MspFirmware):
         return reply(MspCommand.SET_WP)
 
     def _waypoint(self, number: int) -> bytes:
-        """Reply with the last used step; only some of its fields are replaced."""
+        """Reply with the last used step. Only some of the fields are replaced."""
         navigation = self._navigation
         home = self._home or (0, 0)
         if number in (_HOME, _HOLD):

@@ -35,7 +35,7 @@ class MultiWiiMission:
         return found
 
     def recall(self, number: int) -> tuple[int, NavWaypoint, bool]:
-        """A waypoint with the number in its slot, and True if its checksum is valid.
+        """A waypoint with the number in its slot, and True if the checksum is valid.
 
         Above the capacity are the EEPROM's other contents; here it is erased.
         """
@@ -43,7 +43,7 @@ class MultiWiiMission:
         return *unpack_waypoint(slot[:-1]), _is_sound(slot)
 
     def store(self, number: int, waypoint: NavWaypoint) -> bool:
-        """Write one; False if the number is out of range."""
+        """Write one. Returns False if the number is out of range."""
         if not 1 <= number <= self._capacity:
             return False
         packed = waypoint.pack(number)

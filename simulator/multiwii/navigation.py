@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""MultiWii 2.4's return home, and its mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
+"""MultiWii 2.4's return home, and the mission mode (GPS.cpp): it fetches one step after the other from the EEPROM.
 
 Not simulated: the fence, the settling before a landing, creeping to a waypoint that is held from afar, and resuming an
 interrupted mission.
@@ -53,7 +53,7 @@ class MultiWiiNavigation:
         return NavStatus(self.mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
 
     def fly(self, seconds: float, mode: Mode) -> None:
-        """Advance the flight; `mode`: the one that the pilot's switches select."""
+        """Advance the flight. `mode`: the one that the pilot's switches select."""
         if mode is not self.mode:
             self.end(Error.NONE)
             self.mode = mode
@@ -140,7 +140,7 @@ class MultiWiiNavigation:
     def _fly_leg(self, seconds: float) -> None:
         target = (self.step.lat_e7, self.step.lon_e7)
         arrived = self._craft.fly_to(target, min(self.step.alt_cm / 100, HIGHEST_M), _CRUISE_MS, seconds)
-        # With a point of interest set, its distance replaces the waypoint's (GPS_adjust_heading); a waypoint that was
+        # With a point of interest set, the distance replaces the waypoint's (GPS_adjust_heading). A waypoint that was
         # passed still counts.
         if not arrived and (self._poi is None or _distance_m(self._craft.position, self._poi) > WP_RADIUS_M):
             return

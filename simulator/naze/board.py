@@ -25,7 +25,7 @@ from simulator.naze.whole_flash import WholeFlash
 class SimulatedNaze(SimulatedBoard):
     """A Naze32 with Harakiri.
 
-    `memory` is the flash chip, of `flash_size(options)` bytes; without it the board has its own blank one.
+    `memory` is the flash chip, of `flash_size(options)` bytes. Without it the board has its own blank one.
     `boot_missions` makes the mission extension, at every boot.
     """
 

@@ -33,7 +33,7 @@ class CommandLine:
         self._line = TypedLine(48) if tree is Tree.TESTCODE3 else TypedLine(47, rubs_out=False)
 
     def type(self, byte: int) -> tuple[bytes, CliRequest | None]:
-        """Take a byte; returns the output and the request to the firmware."""
+        """Take a byte. Returns the output and the request to the firmware."""
         echo, line = self._line.type(byte)
         if line is None:
             return echo, None

@@ -19,7 +19,7 @@ from simulator.naze.missions import Board, BootMissions
 
 #: NM_CAPACITY: the core's capacity in records, independent of SimOptions.
 CORE_CAPACITY = 146
-# NM_BUFFER_SIZE is enough for the patched receiver; this holds any MSP payload.
+# NM_BUFFER_SIZE is enough for the patched receiver. This holds any MSP payload.
 _BUFFER = c_uint8 * 255
 
 
@@ -43,7 +43,7 @@ def load_core(path: Path) -> BootMissions:
 class CompiledCore:
     """The core as of one boot; see Missions.
 
-    Its limits are compiled in: only the flash times come from SimOptions, and the capacity must be CORE_CAPACITY.
+    The limits are compiled in: only the flash times come from SimOptions, and the capacity must be CORE_CAPACITY.
     """
 
     def __init__(self, library: ctypes.CDLL, flash: NorFlash, board: Board) -> None:
@@ -55,7 +55,7 @@ class CompiledCore:
         library.nm_start(self._core, _BOARD, self._board)
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """The reply's payload; None if it is not one of the core's commands. PowerCutError."""
+        """The reply's payload, or None if it is not one of the core's commands. PowerCutError."""
         self._board.now = now
         buffer = _BUFFER(*payload)
         length = self._library.nm_handle(self._core, command, buffer, len(payload))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri from one boot to the next: its main loop, and its serial port as in serialCom (serial.c, mw.c).
+"""Harakiri from one boot to the next: its main loop, and the serial port as in serialCom (serial.c, mw.c).
 
 This object is the RAM, so a new one is a reset.
 """
@@ -137,7 +137,7 @@ class Firmware:
     # -- the main loop ---------------------------------------------------------------------------------------
 
     def next_loop(self) -> float | None:
-        """The time of the next main loop with work to do; None if it waits for a byte or the pilot."""
+        """The time of the next main loop with work to do, or None if it waits for a byte or the pilot."""
         if self._resets_at is not None:
             return self._resets_at
         earliest = self._uart.next_arrival()
@@ -187,7 +187,7 @@ class Firmware:
         return arm_is_on != armed and (armed or self._board.config_write_due is None)
 
     def _follow_pilot(self) -> None:
-        """Arm or disarm; the UART's speed follows (initFRSKYTelemetry, initMinimOSDTelemetry)."""
+        """Arm or disarm. The UART's speed follows (initFRSKYTelemetry, initMinimOSDTelemetry)."""
         if not self._pilot_is_obeyed():
             return
         self._board.armed = not self.armed
@@ -206,11 +206,11 @@ class Firmware:
             self._write_config()
 
     def _write_config(self) -> None:
-        """Write the whole configuration; the firmware does not verify it (writeParams)."""
+        """Write the whole configuration. The firmware does not verify it (writeParams)."""
         self._board.config_write_due = None
         settings = self._settings.encode()
         with contextlib.suppress(FlashError):
-            # With the extension the list has flash of its own; without it, it is part of the configuration.
+            # With the extension the list has flash of its own. Without it, it is part of the configuration.
             if self._missions:
                 self._own_missions.save()
                 self._config.stage(self._board.wp_radius_cm, settings)
@@ -245,7 +245,7 @@ class Firmware:
                 self._last_valid = self._clock
 
     def _trap(self, byte: int) -> Trap | None:
-        """The effect of a byte outside of any protocol; with the extension, bytes of an MSP frame have none."""
+        """The effect of a byte outside of any protocol. With the extension, bytes of an MSP frame have none."""
         if self._missions and self._msp.is_past_header and self.protocol is not _MAVLINK:
             self._traps.clear()
             return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri's MAVLink 1 stream: its messages, schedule and ids (baseflight_mavlink.c).
+"""Harakiri's MAVLink 1 stream: the messages, schedule and ids (baseflight_mavlink.c).
 
 Payloads are packed here and not by pymavlink, because the firmware sends them without MAVLink 2's extra fields.
 """
@@ -137,6 +137,6 @@ def _fields(message: Stream, craft: Craft, uptime_ms: int) -> tuple[float, ...]:
         case Stream.VFR_HUD:
             return 0.0, flight.speed_ms, flight.height_m, flight.climb_ms, heading, throttle
         case Stream.ATTITUDE:
-            # The firmware's pitch is nose-down positive, and it sends no rates.
+            # The firmware's pitch is nose-down positive, and it does not send rates.
             angles = (math.radians(flight.roll), -math.radians(flight.pitch), math.radians(flight.heading))
             return uptime_ms, *angles, 0.0, 0.0, 0.0

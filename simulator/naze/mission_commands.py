@@ -32,7 +32,7 @@ _WRITE_INTERVAL_MS = 300_000
 
 @dataclass(slots=True)
 class _Upload:
-    """A list being staged. `touched`: the time of its last request, seconds."""
+    """A list being staged. `touched`: the time of the last request, seconds."""
 
     identity: ListIdentity
     touched: float
@@ -51,7 +51,7 @@ class MissionCommands:
         self._intervals = 0
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """The reply's payload; None if it is not one of the extension's commands. PowerCutError."""
+        """The reply's payload, or None if it is not one of the extension's commands. PowerCutError."""
         self.drop_stale(now)
         body = unmask(payload)
         match command:
@@ -72,7 +72,7 @@ class MissionCommands:
         return None
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed or at its timeout; add to the write budget."""
+        """Drop an open transfer if the craft is armed or at the timeout; add to the write budget."""
         intervals = int(now * 1000) // _WRITE_INTERVAL_MS
         self._writes_left = min(self._writes_left + intervals - self._intervals, _WRITE_BURST)
         self._intervals = intervals

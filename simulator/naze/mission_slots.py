@@ -2,7 +2,7 @@
 """Two flash slots for the mission, the newest valid one in use, and the configuration's pages.
 
 The layout is that of firmware/naze_mission.h: a header, then the records. The header is programmed after them, its
-seal last: until then the other slot is the list. Staging needs no RAM.
+seal last: until then the other slot is the list. Staging does not need RAM.
 """
 
 import struct
@@ -155,7 +155,7 @@ class StoredConfig:
         return self._read(self._place) is not None
 
     def load(self) -> int:
-        """gps_wp_radius, cm; the default if the place is not valid."""
+        """gps_wp_radius, cm. The default if the place is not valid."""
         place = self._read(self._place)
         return place[0] if place else self._default_cm
 

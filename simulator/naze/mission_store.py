@@ -2,7 +2,7 @@
 """Harakiri's own mission store and the MAVLink messages that fill it (baseflight_mavlink.c, floppy.c).
 
 The list in RAM is changed item by item. Without the extension it is written to flash a second after the last item, even
-if the transfer is incomplete; an error before that reloads the list from flash. With it, the list is written before it
+if the transfer is incomplete. An error before that reloads the list from flash. With it, the list is written before it
 is acknowledged.
 """
 
@@ -204,7 +204,7 @@ class OwnMissionStore:
             self._request(now)
 
     def _record(self, message: Message, command: WpCommand | None) -> WpRecord | None:
-        """The firmware's record for an item; None if it skips it."""
+        """The firmware's record for an item, or None if it skips it."""
         lat_e7, lon_e7 = (int(single(single(degrees) * _E7)) for degrees in (message.x, message.y))
         height = _within(message.z, -32767, 32767) or 2
         if command is None or (command in (*_TO_PLACE, WpCommand.SETROI) and not (lat_e7 and lon_e7)):

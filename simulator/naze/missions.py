@@ -25,7 +25,7 @@ class Board:
         return self.config_write_due is not None or self.faults.busy
 
     def set_wp_radius(self, radius_cm: int, now: float) -> None:
-        """Set gps_wp_radius; it is stored a little later."""
+        """Set gps_wp_radius. It is stored a little later."""
         self.wp_radius_cm = radius_cm
         self.schedule_write(now)
 
@@ -38,10 +38,10 @@ class Missions(Protocol):
     """The extension from one boot to the next (docs/msp-mission.md)."""
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """The reply's payload; None if it is not one of the extension's commands. PowerCutError."""
+        """The reply's payload, or None if it is not one of the extension's commands. PowerCutError."""
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed, or at its timeout."""
+        """Drop an open transfer if the craft is armed, or at the timeout."""
 
     @property
     def stored(self) -> bytes:
@@ -51,12 +51,12 @@ class Missions(Protocol):
         """Store records that the firmware received by other means (nm_store). FlashError, PowerCutError."""
 
     def spend_write(self) -> bool:
-        """Take a flash write from the budget; False if there is none."""
+        """Take a flash write from the budget. Returns False if there is none."""
 
     @property
     def writes(self) -> int:
         """The number of lists ever made valid in this flash."""
 
 
-#: Boots an extension, which loads its list from flash.
+#: Boots an extension, which loads the list from flash.
 BootMissions = Callable[[NorFlash, Board], Missions]

@@ -2,7 +2,7 @@
 """Harakiri's own parameters over MAVLink: the CLI's settings (baseflight_mavlink_send_paramlist, _set_param).
 
 PARAM_REQUEST_LIST alone is answered, one value in a slot of the stream. PARAM_SET changes every setting whose name the
-given one begins with, and schedules a write of the configuration; the patch ignores it while armed. There is no
+given one begins with, and schedules a write of the configuration. The patch ignores it while armed. There is no
 PARAM_REQUEST_READ.
 """
 

@@ -31,7 +31,7 @@ STORED_SIZE = 4 * len(SETTINGS)
 
 
 class SettingsCommands:
-    """The settings in RAM since boot. `stored`: their values in the configuration; empty: the defaults.
+    """The settings in RAM since boot. `stored`: their values in the configuration, or empty if the defaults.
 
     Those of mission flight, which a build `has_flight` for, are not stored.
     """
@@ -50,7 +50,7 @@ class SettingsCommands:
         return b"".join(held.setting.pack(held.value) for held in self.table[: len(SETTINGS)])
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """The reply's payload; None if it is another command."""
+        """The reply's payload, or None if it is another command."""
         body = unmask(payload) or b""
         match command:
             case SettingCommand.SETTING:

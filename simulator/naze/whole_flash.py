@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The simulated board's whole flash, as its boot loader sees it: a stand-in for the program, and above it the rest."""
+"""The simulated board's whole flash, as the boot loader sees it: a stand-in for the program, and above it the rest."""
 
 import struct
 from contextlib import suppress
@@ -17,7 +17,7 @@ _CONFIG_SIZE = 2 * PAGE_SIZE
 
 
 def stand_in(*, patched: bool, version: int = 1) -> bytes:
-    """An image that has everything by which a Harakiri is recognised, and no code. version: of its configuration."""
+    """An image that has everything by which a Harakiri is recognised, and no code. version: of the configuration."""
     vectors = struct.pack("<II", 0x2000_5000, FLASH_BASE + 9)
     return vectors + bytes((version,)) + _TEXT + (PATCH_MARK if patched else b"")
 

@@ -122,7 +122,7 @@ class Body:
         )
 
     def _stand(self, dt: float) -> None:
-        """On the ground it stays where it is, and levels on its legs."""
+        """On the ground it stays where it is, and levels on the legs."""
         self.velocity = ZERO
         self.position = self.position[0], self.position[1], 0.0
         up_x, up_y, up_z = to_body(self.attitude, (0.0, 0.0, 1.0))

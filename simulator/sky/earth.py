@@ -14,7 +14,7 @@ _METRES_PER_DEGREE = 111_319.5
 class Place:
     """The launch place.
 
-    Its magnetic field, in gauss, is about southern Germany's; the declination is the firmware's default of mag_dec.
+    Its magnetic field, in gauss, is about southern Germany's. The declination is the firmware's default of mag_dec.
     """
 
     lat: float = 48.1372

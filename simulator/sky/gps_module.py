@@ -52,7 +52,7 @@ class Measurement:
 class GpsModule:
     """`has_fix` and `is_silent` may be set at any time: the sky is hidden, or the wire is broken.
 
-    Until the board configures it, it speaks NMEA at the board's speed, as set by its owner.
+    Until the board configures it, it speaks NMEA at the board's speed, as set by the owner.
     """
 
     def __init__(self, place: Place, seed: int = 0, lies: Lies | None = None) -> None:
@@ -76,7 +76,7 @@ class GpsModule:
         return min(due, self._next_s)
 
     def hear(self, data: bytes, baud: int) -> None:
-        """Bytes from the board at its speed; other speeds are noise."""
+        """Bytes from the board at the speed; other speeds are noise."""
         if self._baud not in (None, baud):
             return
         self._heard += data

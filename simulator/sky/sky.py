@@ -58,7 +58,7 @@ class Sky:
         self.wind = Wind(weather.wind, weather.wind_from, weather.seed, gusts=weather.gusts)
         self.place = place or Place()
         self.battery = Battery()
-        #: Set to turn the craft about slowly in a pilot's hands, to calibrate its compass.
+        #: Set to turn the craft about slowly in a pilot's hands, to calibrate the compass.
         self.is_held = False
         self.now_s = 0.0
         self._pulses = pulses

@@ -44,7 +44,7 @@ class HarakiriRules:
     """The rules' inputs from the flight controller and the settings.
 
     capacity: records, home included. wp_radius_cm: its gps_wp_radius. takeoff_max_m: the highest take-off.
-    flight: of a board that flies the list; None: it only stores it.
+    flight: of a board that flies the list, or None if it only stores it.
     """
 
     has_home: ClassVar[bool] = True
@@ -63,7 +63,7 @@ class HarakiriRules:
 
 
 def harakiri_rules(settings: RuleSettings) -> HarakiriRules:
-    """The mission rules; missing settings are those of a board with its defaults."""
+    """The mission rules; missing settings are those of a board with the defaults."""
     radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
     return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
 
@@ -184,7 +184,7 @@ class HarakiriCheck(ListCheck):
         return replace(home, lat_e7=lat_e7, lon_e7=lon_e7)
 
     def _keep(self, item: MissionItem, rule: CommandRule) -> None:
-        """Keep one item; every value that cannot be stored becomes a finding."""
+        """Keep one item. Every value that cannot be stored becomes a finding."""
         if item.seq and item.frame in (*SEA_LEVEL_FRAMES, *TERRAIN_FRAMES) and rule.height is not UNUSED:
             self._now_relative(item)
         if item.seq == 0:

@@ -9,7 +9,7 @@ from bridge.model.ground_track import Place, distance_m
 from protocols.msp.mission import WpCommand, WpRecord
 from reports.finding import News
 
-#: NF_MAX_LEG_M; and NF_TAKEOFF_LEAST_M, also of legs, and NF_TAKEOFF_MOST_M.
+#: NF_MAX_LEG_M, and NF_TAKEOFF_LEAST_M, also of legs, and NF_TAKEOFF_MOST_M.
 MAX_LEG_M, LEAST_M, TAKEOFF_MOST_M = 2000, 2, 15
 PLACED = (WpCommand.WAYPOINT, WpCommand.LOITER_UNLIM, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)
 _WITHOUT_HEIGHT = (WpCommand.LAND, WpCommand.SETROI)
@@ -62,7 +62,7 @@ def _flown_m(record: WpRecord) -> int:
 
 
 def fly(records: Sequence[WpRecord], departure: Departure) -> FlownPath:
-    """The way of the records; the first is the list's home. RETURN_TO_LAUNCH leads to the place of arming."""
+    """The way of the records. The first is the list's home. RETURN_TO_LAUNCH leads to the place of arming."""
     legs: list[Leg] = []
     here: Place | None = departure.place
     here_cm = None

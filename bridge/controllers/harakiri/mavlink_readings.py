@@ -27,7 +27,7 @@ class HarakiriReadings(MavlinkReadings):
 
     def __init__(self, vehicle: v.Vehicle) -> None:
         super().__init__(vehicle)
-        #: From its heartbeat, with the time; None until one is heard, up to a second after arming.
+        #: From the heartbeat, with the time, or None until one is heard, up to a second after arming.
         self._is_level: tuple[bool, float] | None = None
         self.readers |= {
             m.MAVLINK_MSG_ID_VFR_HUD: self._vfr_hud,
@@ -41,7 +41,7 @@ class HarakiriReadings(MavlinkReadings):
         self.hear_arming(message, now)
 
     def _hear_mode(self) -> None:
-        """Its heartbeat says only whether it levels itself; the rest follows from the pilot's switches."""
+        """The heartbeat says only whether it levels itself. The rest follows from the pilot's switches."""
         switches, sticks = self.vehicle.last(v.Switches), self.vehicle.last(v.Sticks)
         is_resumed = switches is not None and sticks is None and self.vehicle.flight_mode is not None
         if self._is_level is None or is_resumed:  # just after a restart of the bridge in flight
@@ -80,7 +80,7 @@ class HarakiriReadings(MavlinkReadings):
             self.vehicle.hear(v.Signal(now, v.Source.MAVLINK, message.rssi / _MAX_RSSI))
 
     def _named_value_int(self, message: Message, now: float) -> None:
-        """A Harakiri's report on its mission flight; the records reached have messages of their own."""
+        """A Harakiri's report on the mission flight. The records reached have messages of their own."""
         progress = decode_summary(message.value) if message.name == SUMMARY else None
         if progress is None:
             return

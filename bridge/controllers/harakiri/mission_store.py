@@ -54,7 +54,7 @@ _BUSY_TIMEOUT_S = 1.0
 _BUSY_INTERVAL_S = 0.1
 #: Restarts of one push (after a reset, damaged line, flash error) before it is given up.
 _MAX_BEGINS = 3
-#: A push may take this long, plus twice the time of its bytes on the line: Mission Planner waits 4.9 s for the ack.
+#: A push may take this long, plus twice the time of the bytes on the line: Mission Planner waits 4.9 s for the ack.
 _PUSH_S = 3.8
 #: How long to ask for the outcome of a COMMIT without a reply.
 _LOOK_S = 0.4
@@ -91,9 +91,9 @@ class HarakiriMissions(_HarakiriStore):
         self.info = board.info
         self._vehicle = vehicle
         self._settings = settings
-        #: The places of its settings, as far as they are known.
+        #: The places of the settings, as far as they are known.
         self._places: dict[str, int] = {}
-        self._may_be_stored = False  # COMMIT was sent, and its result is still unknown
+        self._may_be_stored = False  # COMMIT was sent, and the result is still unknown
 
     def report(self) -> Conversation[StoreReport | None]:
         info = yield from self._read_info()
@@ -111,7 +111,7 @@ class HarakiriMissions(_HarakiriStore):
         return StoreReport(state, rules, info.stored)
 
     def _read_flight(self) -> Conversation[FlightLimits | None]:
-        """The settings that decide about a list in flight; None for a board that does not fly it."""
+        """The settings that decide about a list in flight, or None for a board that does not fly it."""
         if self._vehicle.last_flight is None:
             return None
         values = yield from read_by_name(self._places, "mission_first", "mission_height", "mission_radius")
@@ -130,7 +130,7 @@ class HarakiriMissions(_HarakiriStore):
                     begun = yield from self._begin(wanted)
                     self._may_be_stored = begun.status is ReplyStatus.SAME
                     if begun.status is ReplyStatus.SAME:
-                        # An equal checksum is no proof of the same list.
+                        # An equal checksum is not a proof of the same list.
                         if (yield from self.pull()) == tuple(records):
                             return PushResult(None, unchanged=True)
                         continue
@@ -155,7 +155,7 @@ class HarakiriMissions(_HarakiriStore):
         return PushResult(failure)
 
     def pull(self) -> Conversation[tuple[WpRecord, ...] | None]:
-        """Read the whole list and compare its checksum; again if the list changed meanwhile."""
+        """Read the whole list and compare the checksum; again if the list changed meanwhile."""
         for _ in range(2):
             info = yield from self._read_info()
             if info is None:
@@ -167,12 +167,12 @@ class HarakiriMissions(_HarakiriStore):
         return None
 
     def _read_info(self) -> Conversation[Info | None]:
-        # Every waypoint's radius depends on the one in INFO, and its checksum identifies the stored list.
+        # Every waypoint's radius depends on the one in INFO, and the checksum identifies the stored list.
         reply = yield from ask_surely(ext.INFO_REQUEST, MissionCommand.INFO, ext.INFO_SIZE)
         return None if reply is None else ext.decode_info(reply.payload)
 
     def _begin(self, wanted: ListIdentity) -> Conversation[Staged]:
-        """Ask again for a second while it is busy writing its configuration."""
+        """Ask again for a second while it is busy writing the configuration."""
         waited_s = 0.0
         while True:
             reply = yield from ask(ext.encode_begin(wanted), MissionCommand.BEGIN, _SHORT_REPLY_SIZE, exclusive=True)
@@ -224,7 +224,7 @@ class HarakiriMissions(_HarakiriStore):
             raise PushFailed(PushFailure.FLASH, is_final=False)
 
     def _outcome_of_commit(self, wanted: ListIdentity, failure: PushFailure) -> Conversation[PushFailure | None]:
-        """Ask if COMMIT succeeded after all; only silence leaves it uncertain."""
+        """Ask if COMMIT succeeded after all. Only silence leaves it uncertain."""
         try:
             yield TimeLimit(_LOOK_S)
             info = yield from self._read_info()
@@ -268,7 +268,7 @@ def _again(status: ReplyStatus) -> PushFailed:
 
 
 class HarakiriArmedMissions(_HarakiriStore):
-    """A Harakiri that speaks MAVLink, because it is armed: its list is neither read nor written."""
+    """A Harakiri that speaks MAVLink, because it is armed: the list is neither read nor written."""
 
     def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
         self._vehicle = vehicle

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri: its recognition, and its profile for each protocol.
+"""Harakiri: the recognition, and the profile for each protocol.
 
-Disarmed it speaks MSP. Armed, its setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
+Disarmed it speaks MSP. Armed, the setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
 """
 
 from dataclasses import replace
@@ -34,7 +34,7 @@ _OWN_BOX = "GTUNE"
 #: Its own axes are left, forward and up (imu.c).
 _ACC_AXES = ((1, 1), (0, -1), (2, -1))
 _THROTTLE = 2
-#: The highest value of rc_minchk, below which the throttle must be; its default is 1100.
+#: The highest value of rc_minchk, below which the throttle must be; the default is 1100.
 _SURELY_NOT_LOW_US = 1250
 
 
@@ -108,7 +108,7 @@ MAVLINK = Profile(
     missions=HarakiriArmedMissions,
     arming_blockers=arming_blockers,
     mavlink_readings=HarakiriReadings,
-    mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c; other autopilots send as component 1
+    mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c. Other autopilots send as component 1
 )
 FRSKY = Profile(
     "Harakiri in FrSky mode",

@@ -100,7 +100,7 @@ def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, Command
 def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] = _NONE_KNOWN) -> list[MissionItem]:
     """The items of a stored list (docs/mission-rules.md, "Read-back").
 
-    Frame 3, home frame 0. A region of interest gets its command number from `sent_as` (stored seq to MAV_CMD), else
+    Frame 3, home frame 0. A region of interest gets the command number from `sent_as` (stored seq to MAV_CMD), else
     80. A record with an unknown WpCommand becomes MAV_CMD 0, with the raw number as its param1: no ground station
     treats that as a flight command, and the rules would drop it (our own choice).
     """

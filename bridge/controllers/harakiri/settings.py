@@ -88,7 +88,7 @@ _LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it 
 
 
 class _Place(NamedTuple):
-    """A setting's handle: its place and description in the board's table."""
+    """A setting's handle: the place and description in the board's table."""
 
     number: int
     setting: Setting
@@ -145,7 +145,7 @@ class HarakiriFcSettings(FcSettings):
         return None
 
     def read_back(self, setting: BoardSetting) -> Conversation[Sequence[BoardSetting]]:
-        """From the reply to the write, which the board has read from its RAM."""
+        """From the reply to the write, which the board has read from the RAM."""
         if not isinstance(setting.handle, _Place):
             return (yield from self._modes.read_back(setting))
         reply, (number, described) = self._reply, setting.handle
@@ -180,7 +180,7 @@ class HarakiriFcSettings(FcSettings):
 
 
 def read_by_name(places: dict[str, int], *names: str) -> Conversation[list[float] | None]:
-    """The values of these settings; None: it lacks one, does not answer, or is armed.
+    """The values of these settings, or None if it lacks one, does not answer, or is armed.
 
     `places`: of the settings found so far, which this fills; new settings are at the table's end.
     """
@@ -206,7 +206,7 @@ def read_by_name(places: dict[str, int], *names: str) -> Conversation[list[float
 
 
 def _whole() -> Conversation[TableReply | None]:
-    """Number and checksum of all settings; None if it does not answer, or is armed."""
+    """Number and checksum of all settings, or None if it does not answer, or is armed."""
     reply = yield from ask(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
     whole = None if reply is None else decode_table(reply.payload)
     return whole if whole is not None and whole.status is ReplyStatus.OK else None

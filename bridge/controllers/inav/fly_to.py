@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Set waypoint: makes an INAV that flies its mission fly to another of its records (MSP2_INAV_SET_WP_INDEX).
+"""Set waypoint: makes an INAV that flies the mission fly to another of the records (MSP2_INAV_SET_WP_INDEX).
 
-INAV checks that it is armed, in waypoint mode, and that its list has the record. It also accepts a new record while it
-lands and lands nevertheless, and would take off again after a landing: both are refused here. Its reply proves nothing,
+INAV checks that it is armed, in waypoint mode, and that the list has the record. It also accepts a new record while it
+lands and lands nevertheless, and would take off again after a landing: both are refused here. The reply proves nothing,
 so NAV_STATUS is read afterwards.
 """
 
@@ -46,7 +46,7 @@ _NO_ANSWER = Refusal(MissionResult.ERROR, sentences.SET_UNANSWERED())
 def fly_to(
     number: int, record: NavRecord, held: Conversation[NavRecord | None], board: FlightController
 ) -> Conversation[Refusal | None]:
-    """Make INAV fly to record `number`; None if it does. held: reads the record that INAV has there."""
+    """Make INAV fly to record `number`. Returns None if it does. held: reads the record that INAV has there."""
     reply = yield from ask(request(Msp.INAV_STATUS), Msp.INAV_STATUS, STATUS_SIZE)
     state = None if reply is None else decode_inav_status(reply.payload)
     active = names_of_active(state.box_flags, board.boxes) if state else set()

@@ -55,7 +55,7 @@ def has_zones(board: FlightController) -> bool:
 
 
 def read_zones_in_force() -> Conversation[tuple[Geozone, ...] | None]:
-    """All zones, or none if the feature is off or one of them lacks corners; None: it does not answer."""
+    """All zones, or none if the feature is off or one of them lacks corners, or None if it does not answer."""
     is_on = yield from _ask_feature()
     if not is_on:
         return None if is_on is None else ()
@@ -70,7 +70,7 @@ def _ask_feature() -> Conversation[bool | None]:
 
 
 def read_zones() -> Conversation[tuple[Geozone, ...] | None]:
-    """Those that have corners; None: it does not answer."""
+    """Those that have corners, or None if it does not answer."""
     zones: list[Geozone] = []
     for number in range(GEOZONES):
         reply = yield from ask(encode_read_geozone(number), GEOZONE, GEOZONE_SIZE)
@@ -256,7 +256,7 @@ def fence_items(zones: Sequence[Geozone]) -> tuple[MissionItem, ...]:
 
 
 def hidden_values(zone: Geozone) -> str:
-    """The heights and the action, which a fence cannot show; empty if there are none."""
+    """The heights and the action, which a fence cannot show, or empty if there are none."""
     level = "above sea" if zone.is_above_sea else "above home"
     names = [f"floor {zone.lowest_cm / 100:g} m {level}"] if zone.lowest_cm else []
     names += [f"ceiling {zone.highest_cm / 100:g} m {level}"] if zone.highest_cm else []
@@ -289,7 +289,7 @@ def _divides(one: _Metres, other: _Metres, start: _Metres, end: _Metres) -> bool
 
 
 def _anticlockwise(corners: Sequence[Corner]) -> tuple[Corner, ...]:
-    """In the order that INAV's way around a zone needs; the first corner stays the first."""
+    """In the order that INAV's way around a zone needs. The first corner stays the first."""
     area = 0.0
     for one, other in zip(corners, (*corners[1:], corners[0]), strict=True):
         (north1, east1), (north2, east2) = (north_east_m(corners[0], each) for each in (one, other))

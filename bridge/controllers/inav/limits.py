@@ -24,7 +24,7 @@ from reports.finding import News
 
 
 class RthAltMode(IntEnum):
-    """nav_rth_alt_mode; the last one only in version 6."""
+    """nav_rth_alt_mode. The last one only in version 6."""
 
     CURRENT = 0
     EXTRA = 1
@@ -48,7 +48,7 @@ class InavLimits:
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
     zones: those in force; none without the feature GEOZONE. selected: the mission that was selected, from 1, if there
-    are several. approach: an aeroplane's to the LAND of the new list; None before 7.1.
+    are several. approach: an aeroplane's to the LAND of the new list, or None before 7.1.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -67,7 +67,7 @@ class InavLimits:
     approach: FwApproach | None = None
 
     def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
-        """With these settings; ValueError for one that is neither a number nor one of its choices."""
+        """With these settings. Raises ValueError for one that is neither a number nor one of its choices."""
         return replace(self, **{name: _number(name, values[name]) for name in SETTING_NAMES if name in values})
 
     def return_cm(self, _rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
@@ -108,7 +108,7 @@ class InavLimits:
             yield Judgement(None, "", f"Stored as mission 1, mission {self.selected} was selected", News.NOTICE)
 
     def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
-        """INAV measures the distance to the first record, whatever its action, from where it is armed."""
+        """INAV measures the distance to the first record, whatever the action, from where it is armed."""
         limit_m = self.nav_wp_max_safe_distance
         if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7) or departure.place is None:
             return
@@ -199,7 +199,7 @@ SETTING_NAMES = tuple(field.name for field in fields(InavLimits) if field.name n
 
 
 def saved_limits(saved: SavedSettings | None) -> InavLimits:
-    """The settings in a file; those that it lacks, as `diff all` does, have INAV's defaults. ValueError."""
+    """The settings in a file. Those that it lacks, as `diff all` does, have INAV's defaults. ValueError."""
     return InavLimits() if saved is None else InavLimits(safehomes=saved.safehomes).with_settings(saved.values)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV: the list is only in RAM until SAVE; an incomplete list cannot be flown (docs/inav.md).
 
-Its store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read;
+The store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read;
 armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
 """
 
@@ -51,19 +51,19 @@ from protocols.msp.nav import (
 from protocols.msp.nav_items import item_seqs
 
 _MAX_SAVES = 3
-#: Requests after SAVE: their timeouts together exceed its flash time.
+#: Requests after SAVE: their timeouts together exceed the flash time.
 _ASKS_AFTER_SAVE = 12
 _MAX_READS = 2
 _SETTING_SIZE = 1
 
 
 class InavMissions(NavMissions, FliesToItems):
-    """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before its last record."""
+    """The mission store of one INAV. Record 1 wipes all missions, and no list is valid before the last record."""
 
     reads_armed = True
     #: All records in the store, as last read or written while disarmed.
     _stored: Mission = ()
-    #: GETINFO's reply and the selected mission, as of the last read or write; None if it is being written.
+    #: GETINFO's reply and the selected mission, as of the last read or write, or None if it is being written.
     _seen: tuple[NavInfo, int] | None = None
     #: The same, as of the last check for changes.
     _last_look: tuple[NavInfo, int] | None = None
@@ -72,7 +72,7 @@ class InavMissions(NavMissions, FliesToItems):
     _are_limits_doubtful = True
     #: A board that does not answer about them is asked again only at the next upload.
     _are_limits_silent = False
-    #: All of the board's landing approaches, as last read; None: they may have changed.
+    #: All of the board's landing approaches, as last read, or None if they may have changed.
     _approaches: tuple[FwApproach, ...] | None = None
     #: The same before the current Write.
     _previous_approaches: tuple[FwApproach, ...] = ()
@@ -270,7 +270,7 @@ class InavMissions(NavMissions, FliesToItems):
         return None
 
     def _restore(self, before: Mission | None) -> Conversation[bool]:
-        """Make it LOAD the saved missions; if that is not the old list, write that one again."""
+        """Make it LOAD the saved missions. If that is not the old list, write that one again."""
         if self._vehicle.armed:
             return False
         with suppress(LinkLost):
@@ -289,7 +289,7 @@ class InavMissions(NavMissions, FliesToItems):
         return False
 
     def _look(self) -> Conversation[tuple[NavInfo, int] | None]:
-        """GETINFO, and the number of the selected mission, from 1; of an incomplete list, none is selected."""
+        """GETINFO, and the number of the selected mission, from 1. Of an incomplete list, none is selected."""
         info = yield from self._info()
         if info is None:
             return None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes and geozones, as rally points and fences: in RAM until its configuration is written.
+"""INAV's safehomes and geozones, as rally points and fences: in RAM until the configuration is written.
 
-The old ones stay in its flash until the new ones are read back equal; if they are not, the old ones are written again.
+The old ones stay in its flash until the new ones are read back equal. If they are not, the old ones are written again.
 """
 
 from abc import abstractmethod
@@ -36,7 +36,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
         self._arm_bit = controller.arm_bit
         #: As last read; None: unknown.
         self._known: tuple[RecordT, ...] | None = None
-        #: True if the board's RAM may differ from its flash.
+        #: True if the board's RAM may differ from the flash.
         self._is_unsaved = False
 
     def report(self) -> Conversation[StoreReport | None]:
@@ -81,14 +81,14 @@ class InavPlaceStore(FcMissionStore[RecordT]):
 
     @abstractmethod
     def _whole(self, records: tuple[RecordT, ...]) -> tuple[RecordT, ...]:
-        """The list as it is read back; of an empty one, what clears it."""
+        """The list as it is read back. Of an empty one, what clears it."""
 
     @abstractmethod
     def _write(self, wanted: tuple[RecordT, ...], held: tuple[RecordT, ...]) -> Conversation[bool]:
-        """Set what differs from `held`; False if the board refuses or does not answer."""
+        """Set what differs from `held`. Returns False if the board refuses or does not answer."""
 
 
 def take(command: int, payload: bytes, *, tries: int = 3) -> Conversation[bool]:
-    """Send a setter; True if it was acknowledged."""
+    """Send a setter. Returns True if it was acknowledged."""
     reply = yield from ask(request(command, payload), command, _ACK_SIZE, tries=tries)
     return reply is not None and reply.direction is Direction.REPLY

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV: its recognition and its profile."""
+"""INAV: the recognition and the profile."""
 
 from dataclasses import replace
 
@@ -66,7 +66,7 @@ PROFILE = Profile(
     has_gyro_deg_s=True,
     accepts_any_byte=True,
     calibrates_six_positions=True,
-    # Its serial task runs 100 times a second (fc_tasks.c).
+    # The serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
     silence_s=SILENCE_WITH_H7_S,
     missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),

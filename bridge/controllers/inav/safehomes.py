@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes as rally points: up to eight places, without heights; and the approaches by which it lands.
+"""INAV's safehomes as rally points: up to eight places, without heights, and the approaches by which it lands.
 
 Each MSP_SET_WP erases an approach: that of the mission whose number is the count of missions written since the boot,
 and after nine missions all of them, also those of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
@@ -52,7 +52,7 @@ def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ..
 
 
 def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach] = ()) -> Conversation[bool]:
-    """Set those that the board lacks, and read them back; False if that fails.
+    """Set those that the board lacks, and read them back. Returns False if that fails.
 
     Of the empty ones only those are set that are not empty in `held`, the board's own.
     """
@@ -90,7 +90,7 @@ def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
 
 
 def with_approaches(safehomes: Sequence[Safehome], approaches: Sequence[FwApproach]) -> tuple[Safehome, ...]:
-    """Each safehome's approach has its number; a version without approaches has none."""
+    """Each safehome's approach has its number. A version without approaches has none."""
     return tuple(each._replace(approach=approaches[each.number]) if approaches else each for each in safehomes)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All settings of an INAV, one request each, by their place in its table; and its modes."""
+"""All settings of an INAV, one request each, by their place in its table, and its modes."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -32,10 +32,10 @@ from protocols.msp.settings import RANGES
 
 #: The usual size; its ring also holds the few replies with many names of values.
 _REPLY_SIZE = 160
-#: INAV has about 650; a board that never ends its table must not be asked for ever.
+#: INAV has about 650; a board that never ends the table must not be asked for ever.
 _MOST = 2000
 _TRIES = 3
-#: PIDs, modes, rates and MISC. With EZ Tune on (its first byte), each reading of the PIDs lets INAV compute them again.
+#: PIDs, modes, rates and MISC. With EZ Tune on (the first byte), each reading of the PIDs lets INAV compute them again.
 _SOME = (Msp.INAV_EZ_TUNE, Msp.PID_V2, Msp.MODE_RANGES, Msp.INAV_RATE_PROFILE, Msp.INAV_MISC)
 _KINDS = {InavType.FLOAT: ValueKind.FLOAT, InavType.STRING: ValueKind.TEXT}
 #: Disarmed motors get these pulses.
@@ -44,11 +44,11 @@ _FIXED = {"3d_neutral": "disarmed motors get this pulse: set it with INAV Config
 
 
 class InavFcSettings(FcSettings):
-    """The settings of one INAV; a setting's handle is its type there. Those of profiles are the active one's."""
+    """The settings of one INAV. A setting's handle is the type there. Those of profiles are the active one's."""
 
     def __init__(self, board: FlightController) -> None:
         self._modes = MspPartSettings(board, RANGES)
-        #: The replies to `_SOME` when the whole table was read; None after a change through the bridge.
+        #: The replies to `_SOME` when the whole table was read, or None after a change through the bridge.
         self._some: list[bytes] | None = None
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
@@ -114,7 +114,7 @@ class InavFcSettings(FcSettings):
 
 
 def read_values(names: Iterable[str]) -> Conversation[dict[str, Value] | None]:
-    """The values of these settings; those that this version lacks are missing. None: it does not answer."""
+    """The values of these settings. Those that this version lacks are missing. None: it does not answer."""
     values: dict[str, Value] = {}
     for name in names:
         reply = yield from _ask(encode_about_name(name))

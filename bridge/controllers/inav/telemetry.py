@@ -54,7 +54,7 @@ def _inav_status(vehicle: Vehicle, payload: bytes, controller: FlightController,
 
 
 def arming_blockers(vehicle: Vehicle, now: float) -> tuple[str, ...] | None:
-    """The reasons that prevent arming, as last reported; None before the first report."""
+    """The reasons that prevent arming, as last reported, or None before the first report."""
     readiness = vehicle.fresh(Readiness, now)
     return None if readiness is None else readiness.blockers
 
@@ -107,7 +107,7 @@ def _home(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now:
 
 
 def _nothing(_vehicle: Vehicle, _payload: bytes, _controller: FlightController, _now: float) -> None:
-    """INAV's BOX has the active boxes, as INAV_STATUS does; the switches' ranges are elsewhere."""
+    """INAV's BOX has the active boxes, as INAV_STATUS does. The switches' ranges are elsewhere."""
 
 
 INAV_DECODERS: Mapping[int, Decoder] = {

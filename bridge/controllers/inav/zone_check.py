@@ -45,7 +45,7 @@ def _met(legs: Sequence[Leg], what: str, action: int) -> Iterable[Judgement]:
 
 
 def zone_ahead(zones: Sequence[Geozone], place: Place) -> str:
-    """The nearest border at which INAV may have stopped here; empty if there is none."""
+    """The nearest border at which INAV may have stopped here, or empty if there is none."""
     near = [(_border_m(zone, place), zone) for zone in zones if zone.action]
     metres, zone = min(near, key=lambda each: each[0], default=(inf, None))
     if zone is None or metres > _AHEAD_M:
@@ -65,7 +65,7 @@ def _weight(blocked: Sequence[str]) -> News | None:
 
 
 def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
-    """Where the place is if INAV does not arm there; else empty."""
+    """Where the place is if INAV does not arm there, else empty."""
     inside = [zone for zone in zones if zone.lowest_cm <= 0 and _is_inside(zone, place)]
     for zone in inside:
         if not zone.is_inclusive:
@@ -75,7 +75,7 @@ def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
 
 
 def _shares_height(zone: Geozone, leg: Leg) -> bool:
-    """True unless the whole leg is above or below the zone; a zone above sea level is taken as without limits."""
+    """True unless the whole leg is above or below the zone. A zone above sea level is taken as without limits."""
     if leg.start_cm is None or leg.end_cm is None or zone.is_above_sea:
         return True
     is_above = zone.highest_cm and min(leg.start_cm, leg.end_cm) > zone.highest_cm
@@ -108,7 +108,7 @@ def _insides(zones: Sequence[Geozone], leg: Leg) -> Iterable[bool]:
 
 
 def _borders(zone: Geozone, leg: Leg) -> Iterable[float]:
-    """Where the line of the leg meets the zone's border, in shares of its length."""
+    """Where the line of the leg meets the zone's border, in shares of the length."""
     north, east = north_east_m(leg.start, leg.end)
     if not (length2 := north * north + east * east):
         return

@@ -45,7 +45,7 @@ _MAX_HEIGHT_CM = 3_276_700
 
 @dataclass(frozen=True, slots=True)
 class NavRules:
-    """The rules of one flight controller. current: its current list. others: the other missions in its store."""
+    """The rules of one flight controller. current: the current list. others: the other missions in its store."""
 
     profile: NavProfile
     current: Mission = ()
@@ -67,7 +67,7 @@ class NavCheck(ListCheck):
     """The check of one list.
 
     Home (item 0) is not stored: these flight controllers set their own where they arm. It must be a WAYPOINT, as in
-    every list; without coordinates it is shown at `fallback_home`.
+    every list. Without coordinates it is shown at `fallback_home`.
     """
 
     def __init__(self, rules: NavRules, count: int, fallback_home: tuple[int, int] | None = None) -> None:
@@ -122,7 +122,7 @@ class NavCheck(ListCheck):
         return None
 
     def _take(self, item: MissionItem, rule: NavRule) -> RejectingFinding | None:
-        """Keep one item as a record; every value that cannot be stored becomes a finding."""
+        """Keep one item as a record. Every value that cannot be stored becomes a finding."""
         if rule.position and (rejection := refuse_position(item)):
             return rejection
         if not math.isfinite(item.alt_m):
@@ -195,7 +195,7 @@ class NavCheck(ListCheck):
         return None
 
     def _take_jump(self, item: MissionItem) -> RejectingFinding | None:
-        """Reserve a record; its target is known once all items have arrived."""
+        """Reserve a record. The target is known once all items have arrived."""
         if not (math.isfinite(item.p1) and item.p1 == math.trunc(item.p1) and 1 <= item.p1 < self._count):
             return reject(MissionResult.INVALID_PARAM1, item, "p1", "there is no such item to jump to")
         is_endless = item.p2 < REPEATS.low

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A list as INAV and MultiWii fly it (docs/inav.md).
 
-Records are given by their place, from 0; a JUMP's p1 is a number, from 1.
+Records are given by their place, from 0. A JUMP's p1 is a number, from 1.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,10 +16,10 @@ _ABOVE_SEA = 1
 
 
 class BoardLimits(Protocol):
-    """The settings of one board that decide about its missions."""
+    """The settings of one board that decide about the missions."""
 
     def return_cm(self, rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
-        """The height of a return that begins at `here_cm`; None if unknown."""
+        """The height of a return that begins at `here_cm`, or None if unknown."""
 
     def judge(self, records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         """Whether, and how differently, the board flies these records."""
@@ -69,7 +69,7 @@ def _end(record: NavRecord, departure: Departure) -> Place | None:
 
 
 def above_home_cm(record: NavRecord, departure: Departure) -> int | None:
-    """The leg's height; None if it is above sea level, and home's altitude is not known."""
+    """The leg's height, or None if it is above sea level, and home's altitude is not known."""
     if not record.p3 & _ABOVE_SEA:
         return record.alt_cm
     return None if departure.altitude_m is None else record.alt_cm - round(100 * departure.altitude_m)
@@ -104,7 +104,7 @@ def _reached(records: Sequence[NavRecord], starts: set[int]) -> set[int]:
 
 
 def lands_after_rth(records: Sequence[NavRecord]) -> bool:
-    """True if an INAV lands after any RTH of the list: the last record's p1 decides, regardless of its action.
+    """True if an INAV lands after any RTH of the list: the last record's p1 decides, regardless of the action.
 
     INAV keeps a JUMP's target as an index, so one to the first record counts as 0.
     """

@@ -2,7 +2,7 @@
 """Writes a list to INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
 
 A reply to SET_WP does not mean that the record was stored, so only read-back counts. Nothing is sent to an armed
-flight controller: STATUS is requested before the first record and before the last one, which makes the list flyable,
+flight controller: STATUS is requested before the first record and before the last, which makes the list flyable,
 and watched in between.
 """
 
@@ -80,11 +80,11 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return NavRules(self._profile, self._known or ())
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it; an empty one has no items, not even home."""
+        """A list as a ground station reads it. An empty one has no items, not even home."""
         return items_from_records(records, home_item(self._vehicle.place()), sent_as) if records else ()
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
-        """Home as on the flight controller; before it has one, as sent, if known."""
+        """Home as on the flight controller. Before it has one, as sent, if known."""
         if not items:
             return items
         is_known = bool(items[0].lat_e7 and items[0].lon_e7)
@@ -98,7 +98,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list and verify it; after a failure restore the old list, if known."""
+        """Write the list and verify it. After a failure restore the old list, if known."""
         before, self._known = self._known, None
         # The result if the link is lost now.
         failure = PushFailure.NO_ANSWER
@@ -135,7 +135,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
 
     @abstractmethod
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
-        """Read the list; None if that fails."""
+        """Read the list. Returns None if that fails."""
 
     @abstractmethod
     def _order(self, wanted: tuple[NavRecord, ...]) -> list[tuple[int, NavRecord]]:
@@ -150,12 +150,12 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return records
 
     def _confirm(self, before: tuple[NavRecord, ...] | None) -> Conversation[tuple[NavRecord, ...] | None]:
-        """The old list; None if another client has detectably changed it since it was read."""
+        """The old list, or None if another client has detectably changed it since it was read."""
         yield from ()
         return before
 
     def _restore_at_once(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Restore the old list if that takes no time; True if it is restored."""
+        """Restore the old list if that does not take time. Returns True if it is restored."""
         yield from ()
         return False
 
@@ -234,7 +234,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return True
 
     def _restore(self, before: tuple[NavRecord, ...] | None) -> Conversation[bool]:
-        """Write the old list again, if known; True if it is restored."""
+        """Write the old list again, if known. Returns True if it is restored."""
         if not before or self._vehicle.armed:
             return False
         try:

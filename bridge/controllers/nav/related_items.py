@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Items that depend on others: a JUMP on its target, a LAND on the leg before, a change of speed on those after."""
+"""Items that depend on others: a JUMP on the target, a LAND on the leg before, a change of speed on those after."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class Jumps:
     """Resolves JUMP targets to the flight controller's numbers: records from 1, without dropped or merged items.
 
     back_only: True if they may only go back. places: for each item, the number of records before it. dropped: the
-    numbers of dropped items. wanted: for each JUMP, its record's place and the item.
+    numbers of dropped items. wanted: for each JUMP, the record's place and the item.
     """
 
     back_only: bool

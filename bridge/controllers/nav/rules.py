@@ -27,7 +27,7 @@ class NavProfile:
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and no other may be in its loop; if False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands; else the last record's p1 does. limits: its own settings; None: unknown.
+    decides if it lands, else the last record's p1 does. limits: its own settings; None: unknown.
     """
 
     name: str
@@ -49,7 +49,7 @@ class NavProfile:
 
 
 def inav_profile(capacity: int = INAV_CAPACITY, limits: BoardLimits | None = None) -> NavProfile:
-    """INAV. It stores no POSHOLD_UNLIM."""
+    """INAV. It does not store a POSHOLD_UNLIM."""
     return NavProfile(
         "INAV",
         capacity,

@@ -9,7 +9,7 @@ from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 from protocols.msp.nav_items import HIGHEST_HEADING, leg_speed
 
 _ABOVE_SEA = 1
-#: The fields of a record that items do not show, by its action; of these, only a LAND's p2 changes a flight.
+#: The fields of a record that items do not show, by the action; of these, only a LAND's p2 changes a flight.
 _HIDDEN: Mapping[int, tuple[str, ...]] = {
     NavAction.WAYPOINT: ("p2",),
     NavAction.POSHOLD_UNLIM: ("p1", "p2"),
@@ -53,7 +53,7 @@ def _repeats(record: NavRecord, old: NavRecord) -> bool:
 
 
 def _shown(record: NavRecord) -> NavRecord:
-    """The record without the values that its item does not show."""
+    """The record without the values that the item does not show."""
     hidden = dict.fromkeys(_HIDDEN.get(record.action, ()), 0)
     record = replace(record, **{"p3": record.p3 & _ABOVE_SEA, "flag": 0, **hidden})
     match record.action:

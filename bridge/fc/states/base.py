@@ -39,7 +39,7 @@ class PortClosed:
 class Found:
     """A protocol was heard on the line, and the evidence in words.
 
-    `speed` in baud, None if the line has none; `heard`: a MAVLink frame. `pending`: replies that the board may still
+    `speed` in baud, None if the line has none. `heard`: a MAVLink frame. `pending`: replies that the board may still
     owe to the search.
     """
 
@@ -87,7 +87,7 @@ class Port:
     vehicle: Vehicle = field(default_factory=Vehicle)
     #: The bytes to be written to the port, in order.
     output: list[bytes] = field(default_factory=list)
-    #: The speeds of the last two finds of the board, the older first: a Harakiri that arms may change its speed,
+    #: The speeds of the last two finds of the board, the older first: a Harakiri that arms may change the speed,
     #: and disarmed it comes back.
     good_speeds: deque[int | None] = field(default_factory=lambda: deque(maxlen=2))
     #: The family of the board that was last identified over MSP since the port was opened.
@@ -137,9 +137,9 @@ class State(ABC):
     name: ClassVar[str]
     #: True while the flight controller is being searched for.
     is_searching: ClassVar[bool] = False
-    #: The reason why the board cannot be used, and the remedy; None if it can be.
+    #: The reason why the board cannot be used, and the remedy, or None if it can be.
     trouble: ClassVar[Happening | None] = None
-    #: The flight controller on the line; None until it is identified.
+    #: The flight controller on the line, or None until it is identified.
     controller: FlightController | None = None
     #: While MSP is spoken.
     link: MspLink | None = None
@@ -148,7 +148,7 @@ class State(ABC):
 
     def __init__(self, port: Port, event: Event, now: float) -> None:
         self.port = port
-        #: The speed that the port must have, baud; None where it has none.
+        #: The speed that the port must have, baud, or None where it has none.
         self.speed = event.speed if isinstance(event, Found) else None
 
     @abstractmethod
@@ -170,7 +170,7 @@ class State(ABC):
 
     @property
     def bad_checksums(self) -> int | None:
-        """Damaged frames since the flight controller was found; None if that is not counted."""
+        """Damaged frames since the flight controller was found, or None if that is not counted."""
         return None
 
 

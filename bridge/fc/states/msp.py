@@ -99,13 +99,13 @@ class MspLine(State):
             return Found(self.port.mavlink_of(heard), self.speed, "heard where MSP was answered before", heard)
         # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
         why = "the incoming data is no longer MSP" if self._is_foreign() else f"no answer for {self._silence_s()} s"
-        # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at its previous, good speed.
+        # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at the previous, good speed.
         has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
 
 
 class Identifying(MspLine):
-    """MSP is answered; the board is being identified."""
+    """MSP is answered. The board is being identified."""
 
     name = "identifying"
     is_searching = True
@@ -189,13 +189,13 @@ class _ForeignBytes:
 
     def note(self, data: bytes) -> None:
         for frame in self._splitter.feed(data) if self.size else ():
-            # A disarmed Harakiri that hears no request sends heartbeats, and still answers MSP.
+            # A disarmed Harakiri that does not hear a request sends heartbeats, and still answers MSP.
             if not is_disarmed_heartbeat(frame):
                 self.mavlink = frame
 
 
 def _identify(profiles: Sequence[Profile]) -> Conversation[FlightController | None]:
-    """Identify the board; None if it left a request unanswered or no profile recognised it."""
+    """Identify the board. Returns None if it left a request unanswered or no profile recognised it."""
     board = Interview()
     try:
         for profile in profiles:

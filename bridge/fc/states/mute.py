@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of a line on which the flight controller answers nothing: its command line, and FrSky telemetry."""
+"""The states of a line on which the flight controller does not answer: the command line, and FrSky telemetry."""
 
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Found, Lost, Port, State

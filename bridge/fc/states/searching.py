@@ -4,7 +4,7 @@
 A disarmed Harakiri sends MAVLink heartbeats until it receives something, and answers both protocols; armed, it may
 speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
-Each visit to a speed first only listens, then probes as well; an MSP reply is confirmed by a second one. Evidence is
+Each visit to a speed first only listens, then probes as well. An MSP reply is confirmed by a second one. Evidence is
 two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender; noise
 produces none of them (test_autosense_noise.py). A board that echoes our probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
@@ -105,7 +105,7 @@ class Searching(State):
             return self.found
         if now >= visit.ends:
             if visit.frsky.values_in_a_row >= _FRSKY_EVIDENCE:
-                # A Harakiri that has heard nothing sends its heartbeat as well.
+                # A Harakiri that has not heard anything sends the heartbeat as well.
                 self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
             elif visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
@@ -129,11 +129,11 @@ class Searching(State):
         return self._on_wire_s(PROBE) + self._on_wire_s(RESYNC) + 2 * _PROBE_INTERVAL_S
 
     def _probe(self, now: float) -> float:
-        """Send a probe if there is room for its reply; return the time to wait for it."""
+        """Send a probe if there is room for the reply. Return the time to wait for it."""
         room = self.pending.room(self.speed, now)
         waiting = self.pending.questions(self.speed, now)
         interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
-        # Every second probe also fills a parser that is stuck in the middle of a frame; a command line is not filled.
+        # Every second probe also fills a parser that is stuck in the middle of a frame. A command line is not filled.
         is_typed = self._visit.echo.is_echo(_ECHO_SIZE)
         if self._visit.probes % 2 and not is_typed and room >= RESYNC_REPLY_SIZE:
             return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
@@ -143,7 +143,7 @@ class Searching(State):
         return interval_s
 
     def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
-        """Send a probe; return the time that it and its reply take on the wire."""
+        """Send a probe. Return the time that it and the reply take on the wire."""
         self._visit.probes += 1
         self.pending.add(self.speed, reply_size, now)
         self.port.output.append(frame)

@@ -25,7 +25,7 @@ UNBLOCK_WIFI = "switch the Wi-Fi on"
 
 
 def fix_step(fix: str, host: Host) -> Step | None:
-    """The changes of a remedy; None if it is unknown, or not possible or needed on this machine."""
+    """The changes of a remedy, or None if it is unknown, or not possible or needed on this machine."""
     found = next(iter(_FIXES[fix](host)), None) if fix in _FIXES else None
     return None if found is None else replace(found, purpose=fix)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the flight controller: its reply to a daemon or to doctor itself, and the troubles in a daemon's status."""
+"""Checks of the flight controller: the reply to a daemon or to doctor itself, and the troubles in a daemon's status."""
 
 import re
 from collections.abc import Callable, Iterator

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the machine: its clock, power supply, disk, stored missions and software versions."""
+"""Checks of the machine: the clock, power supply, disk, stored missions and software versions."""
 
 import os
 import platform
@@ -22,11 +22,11 @@ from storage.database import kept_aside, read_database
 from storage.store_error import StoreError
 
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
-#: A Pi without a clock starts in 1970, or at its last shutdown; no release is older than this.
+#: A Pi without a clock starts in 1970, or at the last shutdown; no release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pyserial", "eclipse-zenoh")
-#: Bits of its reply: undervoltage now, and since the start.
+#: Bits of the reply: undervoltage now, and since the start.
 _NOW, _SINCE_START = 1 << 0, 1 << 16
 _BETTER_SUPPLY = "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires"
 
@@ -137,7 +137,7 @@ def _look_into(path: Path) -> Checked:
 
 
 def output_of(*command: str) -> str:
-    """What a program prints; empty if it is missing or hangs."""
+    """What a program prints, or empty if it is missing or hangs."""
     try:
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=5).stdout  # noqa: S603  # our own words
     except (OSError, subprocess.TimeoutExpired):

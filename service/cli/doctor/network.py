@@ -107,7 +107,7 @@ def _covers(part: str, port: int) -> bool:
 
 
 def _input_chain(rules: str) -> str:
-    """The family, table and name of the chain for arriving packets: "inet filter input"; empty without one."""
+    """The family, table and name of the chain for arriving packets: "inet filter input", or empty without one."""
     found = re.search(r"table (\w+ \S+) \{(?:(?!\ntable).)*?chain (\S+) \{\s*type filter hook input", rules, re.DOTALL)
     return "" if found is None else f"{found[1]} {found[2]}"
 

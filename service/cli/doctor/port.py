@@ -59,7 +59,7 @@ def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
 
 
 def check_candidates(host: Host) -> list[SerialFc]:
-    """The ports tried by `fc = "auto"`; on a Pi without a USB port the UART on the header, even if it is off."""
+    """The ports tried by `fc = "auto"`. On a Pi without a USB port the UART on the header, even if it is off."""
     ports = [SerialFc(port.path, None) for port in serial_ports(host)]
     model = pi_model(host)
     return ports or ([SerialFc(model.header_uart, None)] if model else [])
@@ -143,7 +143,7 @@ def holder_of_port(host: Host, fc: FcAddress) -> Process | None:
 
 
 def _device(host: Host, fc: FcAddress) -> Path | None:
-    """The device behind symbolic links; None if it is no serial port, which the first check reports."""
+    """The device behind symbolic links, or None if it is not a serial port, which the first check reports."""
     if not isinstance(fc, SerialFc):
         return None
     device = host.resolve(fc.path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The actions of the helper. Each recomputes what it changes from this machine; a request can only choose."""
+"""The actions of the helper. Each recomputes what it changes from this machine. A request can only choose."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -44,7 +44,7 @@ _APT = (
 
 
 def receive(pi: ThisPi, size: int) -> str:
-    """Store the body, check that it is this program's package for this machine, and start the update; its version."""
+    """Store the body, check that it is this program's package for this machine, and start the update; the version."""
     if not can_update(pi.host):
         raise HelperRefusal("This package was built without a key for updates: install it with apt in a terminal.")
     path = pi.host.path(_RECEIVED)
@@ -104,7 +104,7 @@ def check_package(path: Path, machine: Machine) -> str:
 
 
 def version_of(path: Path, machine: Machine) -> str | None:
-    """The version of a package file; None if there is none."""
+    """The version of a package file, or None if there is none."""
     try:
         return machine.run((*_SHOW, str(path))).split()[1] if path.exists() else None
     except (SetupError, IndexError):
@@ -118,14 +118,14 @@ def start_update(pi: ThisPi, package: str) -> None:
 
 
 def update_outcome(host: Host) -> str:
-    """The result of the last update, a sentence; empty before the first."""
+    """The result of the last update, a sentence, or empty before the first."""
     return host.read(_OUTCOME).strip()
 
 
 def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Install the package; if the bridge does not run with it, return to the previous one. Returns the outcome."""
+    """Install the package. If the bridge does not run with it, return to the previous. Returns the outcome."""
     was_running = _answers()
-    # Moved first, because it may be the previous one.
+    # Moved first, because it may be the previous.
     installing, kept = package.rename(host.path(f"{_FOLDER}/installing.deb")), host.path(PREVIOUS)
     version, former = version_of(installing, machine), pack_installed(kept, host, machine)
     try:
@@ -142,7 +142,7 @@ def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float],
 
 
 def pack_installed(package: Path, host: Host, machine: Machine) -> str | None:
-    """Pack the installed files as the package that they came from; returns its version."""
+    """Pack the installed files as the package that they came from; returns the version."""
     root = package.with_suffix(".tree")
     shutil.rmtree(root, ignore_errors=True)
     control = root / "DEBIAN"

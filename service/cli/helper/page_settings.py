@@ -57,9 +57,9 @@ def _page_setting(key: Key, value: object, where: str) -> Json:
 
 
 def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-arg]  # its contents are checked here
-    """Write the settings, if all files together can then be used; the bridge takes them over.
+    """Write the settings, if all files together can then be used. The bridge takes them over.
 
-    `values`: by name, each one of the setting's choices; None: the default.
+    `values`: by name, each one of the setting's choices, or None if the default.
     """
     host, given = pi.host, _given(pi.host)
     before = host.read(_FILE)

@@ -32,7 +32,7 @@ _TIMEOUT_S = 30.0
 
 
 def answer(connection: socket.socket, pi: ThisPi, users: Container[int], lock: Path, unit: str) -> None:
-    """Read the request for this unit, carry it out and reply; a request of another user is not even read."""
+    """Read the request for this unit, carry it out and reply. A request of another user is not even read."""
     _, uid, _ = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i")))
     if uid not in users:
         reply: Json = {"error": f"Only the user {_USER} may ask for this."}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The signature of a package: its last member, which dpkg ignores, by ssh-keygen over all bytes before it."""
+"""The signature of a package: the last member, which dpkg ignores, by ssh-keygen over all bytes before it."""
 
 import os
 import subprocess
@@ -28,7 +28,7 @@ def add_signature(package: Path, signature: bytes) -> None:
 
 
 def check_signature(package: Path, signers: Path) -> None:
-    """Check the signature of a package, and remove it; HelperRefusal if it is missing, or of no known key.
+    """Check the signature of a package, and remove it. Raises HelperRefusal if it is missing, or of no known key.
 
     What is left is exactly what was signed. Nothing else reads the package before.
     """

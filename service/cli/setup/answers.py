@@ -38,7 +38,7 @@ class SetupChoices:
 
 
 def earlier_choices(host: Host) -> SetupChoices | None:
-    """The answers of the last setup that have no other file; None on a machine that was never set up."""
+    """The answers of the last setup that have no other file, or None on a machine that was never set up."""
     text = host.read(SETTINGS_FILE)
     if not text:
         return None
@@ -51,7 +51,7 @@ def earlier_choices(host: Host) -> SetupChoices | None:
 
 
 def current_key(host: Host) -> str:
-    """The passphrase in the service's key file, which the service could have replaced; empty if there is none."""
+    """The passphrase in the service's key file, which the service could have replaced, or empty if there is none."""
     try:
         return read_bounded(host.path(KEY_FILE), _MAX_KEY_FILE, follows_links=False).decode().strip()
     except (OSError, ValueError):

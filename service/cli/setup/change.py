@@ -17,7 +17,7 @@ class SetupError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class WriteFile:
-    """Create or replace a file. `secret`: only its owner may read it, and its text is not shown."""
+    """Create or replace a file. `secret`: only the owner may read it, and the text is not shown."""
 
     path: str
     text: str
@@ -51,7 +51,7 @@ Change = WriteFile | RemoveFile | Run
 
 
 def later(command: Sequence[str], delay_s: int, unit: str = "") -> tuple[str, ...]:
-    """The command that runs another one after a delay, in a separate unit."""
+    """The command that runs another after a delay, in a separate unit."""
     named = (f"--unit={unit}",) if unit else ()
     # A timer's default accuracy is a minute.
     when = (f"--on-active={delay_s}", "--timer-property=AccuracySec=100ms")
@@ -87,7 +87,7 @@ class Machine:
                 path.unlink(missing_ok=True)
                 return
             path.parent.mkdir(parents=True, exist_ok=True)
-            # Readable from its first moment: Avahi reads a new file at once.
+            # Readable from the first moment: Avahi reads a new file at once.
             replace_file(path, change.text.encode(), 0o600 if change.secret else 0o644)
         except OSError as error:
             raise SetupError(f"{change.path} cannot be changed: {reason(error)}") from error

@@ -79,7 +79,7 @@ def setup(
     doctor found a problem.
     """
     if not (yes or dry_run or is_root()):
-        fail(_NEEDS_ROOT)  # before its questions
+        fail(_NEEDS_ROOT)  # before the questions
     host = Host(root)
     try:
         fc = None if fc is None else str(parse_fc(fc))
@@ -88,7 +88,7 @@ def setup(
     click.echo(f"This is a {model.name}." if (model := pi_model(host)) else "This is not a known Raspberry Pi model.")
     password = None if password_file is None else secret_line(password_file)
     key = None if key_file is None else secret_line(key_file)
-    check_answers(hotspot, password, country, name)  # before its questions
+    check_answers(hotspot, password, country, name)  # before the questions
     if hotspot is not None and host.path("/run/systemd/system").exists() and not host.wifi_cards():
         raise click.UsageError("this machine has no Wi-Fi card for a hotspot")
     if key is not None and new_key:
@@ -241,7 +241,7 @@ def _print_page(host: Host, address: str) -> None:
 
 
 def page_token(host: Host) -> str:
-    """The status page's token; empty if there is none that can be shown."""
+    """The status page's token, or empty if there is none that can be shown."""
     path = host.path(f"{SERVICE_STATE}/{DEFAULT_NAME}")
     try:
         token = read_bounded(path, 1 << 10, follows_links=False).decode().strip()

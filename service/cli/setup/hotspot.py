@@ -39,7 +39,7 @@ _OPEN = ("nmcli", "connection", "up", CONNECTION)
 
 
 def hotspot_steps(host: Host, hotspot: tuple[str, str] | None, *, is_kept: bool = False) -> Iterator[Step]:
-    """Open the hotspot; if `is_kept`, at once and for good."""
+    """Open the hotspot. If `is_kept`, at once and for good."""
     if hotspot is None:
         return
     ssid, password = hotspot
@@ -105,7 +105,7 @@ def _is_shared_elsewhere(host: Host) -> bool:
 
 
 def hotspot_name(host: Host) -> str | None:
-    """The name of the hotspot's network; None without one."""
+    """The name of the hotspot's network, or None without one."""
     found = re.search(r"^ssid=((?:[0-9]{1,3};)+)$", host.read(HOTSPOT_FILE), re.MULTILINE)
     return found and bytes(int(number) & 0xFF for number in found[1].split(";")[:-1]).decode(errors="replace")
 
@@ -121,7 +121,7 @@ def _escaped(password: str) -> str:
 
 
 def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Open the hotspot, and return to the previous network if no device joins; returns the outcome, a sentence."""
+    """Open the hotspot, and return to the previous network if no device joins. Returns the outcome, a sentence."""
     active = machine.run(("nmcli", "--terse", "--fields", "UUID,DEVICE", "connection", "show", "--active"))
     previous = next((line.split(":")[0] for line in active.splitlines() if line.endswith(f":{HOTSPOT_CARD}")), None)
     leases = host.read(_LEASES)
@@ -145,7 +145,7 @@ def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = 
 
 
 def close_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Close the hotspot until it is opened again; it stays open where the Pi has no other network."""
+    """Close the hotspot until it is opened again. It stays open where the Pi has no other network."""
     _open_at_boot(host, machine, is_on=False)
     machine.run(("nmcli", "connection", "down", CONNECTION))
     for _ in range(_LEAVE_S):
@@ -165,7 +165,7 @@ def _open_at_boot(host: Host, machine: Machine, *, is_on: bool) -> None:
 
 
 def _return_to(previous: str, machine: Machine) -> str:
-    """Close the hotspot; the connection is removed, so that a restart does not open it either."""
+    """Close the hotspot. The connection is removed, so that a restart does not open it either."""
     machine.carry_out(RemoveFile(HOTSPOT_FILE))
     machine.run(_RELOAD)
     machine.run(("nmcli", "connection", "up", previous))
