@@ -189,7 +189,7 @@ def test_imports_within_a_package_go_one_way(package: str) -> None:
     assert found == []
 
 
-def test_imports_between_the_simulators_packages_have_no_cycle() -> None:
+def test_imports_between_the_simulators_packages_do_not_have_a_cycle() -> None:
     """Between its packages. CycleError names the cycle."""
     graph: dict[str, set[str]] = {}
     for file, name in imports(REPOSITORY / "simulator"):
@@ -211,7 +211,7 @@ def test_most_modules_have_a_test_file_of_like_name() -> None:
     assert share >= LEAST_MIRRORED, f"{share:.2f}; without: {', '.join(sorted(lacking))}"
 
 
-def test_the_bridge_is_used_through_its_front_door() -> None:
+def test_the_bridge_is_used_through_the_front_door() -> None:
     """Never a part of it: outside, no `bridge._x`, and `bridge.x.y` only of its two groups of calls. Tests reach its
     parts in one place."""
     found = []

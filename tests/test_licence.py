@@ -8,7 +8,7 @@ _REPOSITORY = Path(__file__).parents[1]
 _SOURCES = ("*.py", "*.c", "*.h", "*.sh", "*.js", "*.css", "Makefile", "*/Makefile")
 
 
-def test_every_source_names_its_licence() -> None:
+def test_every_source_names_the_licence() -> None:
     listed = subprocess.run(["git", "ls-files", *_SOURCES], cwd=_REPOSITORY, capture_output=True, text=True, check=True)
     files = listed.stdout.split()
     assert len(files) > 300

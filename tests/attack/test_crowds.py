@@ -71,7 +71,7 @@ def receives_heartbeats(station: PlainStation, count: int) -> bool:
     return False
 
 
-def test_a_crowd_displaces_no_pilot(start: Starter, stack: ExitStack) -> None:
+def test_a_crowd_does_not_displace_a_pilot(start: Starter, stack: ExitStack) -> None:
     """Three hundred stations, each of which sends heartbeats and asks for everything."""
     bench = start.bench()
 

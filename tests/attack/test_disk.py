@@ -141,7 +141,7 @@ class DaemonThatObeysModes(Daemon):
 
 
 @pytest.mark.parametrize("becomes", _SAVED_NOTHING)
-def test_the_daemon_stops_cleanly_after_its_state_folder_was_lost(
+def test_the_daemon_stops_cleanly_after_the_state_folder_was_lost(
     start: Starter, stack: ExitStack, becomes: str
 ) -> None:
     """What could not be saved is logged once."""

@@ -36,7 +36,9 @@ def test_the_text_of_a_refusal_goes_only_to_the_refused_station(bench: Bench, st
         assert monitor.frames[m.MAVLINK_MSG_ID_STATUSTEXT] <= 4
 
 
-def test_a_flood_to_the_open_port_loses_no_request_of_a_connected_station(bench: Bench, stack: ExitStack) -> None:
+def test_a_flood_to_the_open_port_does_not_lose_a_request_of_a_connected_station(
+    bench: Bench, stack: ExitStack
+) -> None:
     """For some seconds, 15,000 foreign datagrams a second: ten times what the kernel's queue of the port holds."""
     strangers = [Stranger(bench.daemon.address, f"127.0.1.{number + 1}") for number in range(50)]
     for stranger in strangers:

@@ -130,7 +130,7 @@ def test_the_vehicles_refusal_is_the_final_ack() -> None:
     assert any(each.text.startswith("Rejected, WP 3") for _, each in bench.frames if each.get_type() == "STATUSTEXT")
 
 
-def test_nothing_is_sent_to_an_armed_vehicle() -> None:
+def test_does_not_send_to_an_armed_vehicle() -> None:
     bench = connected()
     bench.heartbeat(armed=True)
     bench.upload(PLAN[:5])
@@ -147,7 +147,7 @@ def test_an_empty_list_clears_the_vehicles() -> None:
     assert bench.written == [()]
 
 
-def test_a_vehicle_that_stores_no_missions_gets_every_frame_itself() -> None:
+def test_a_vehicle_that_does_not_store_missions_gets_every_frame_itself() -> None:
     bench = connected(stores=False)
     assert bench.send(m.MAVLink_mission_count_message(*VEHICLE, 5)) == []
     assert bench.send(m.MAVLink_param_request_list_message(*VEHICLE)) == []
@@ -166,7 +166,7 @@ def test_all_other_frames_and_those_of_other_targets_are_passed_on() -> None:
         assert len(bench.to_vehicle) == 1
 
 
-def test_the_sequence_numbers_have_no_gaps() -> None:
+def test_the_sequence_numbers_do_not_have_gaps() -> None:
     bench = connected()
     for _ in range(3):
         bench.heartbeat()

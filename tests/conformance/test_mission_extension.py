@@ -203,7 +203,7 @@ def test_without_a_transfer_chunks_are_refused(fc: Companion) -> None:
     assert fc.commit(identify(NEW)) == Stored(ReplyStatus.NO_TRANSFER, identify(OLD))
 
 
-def test_more_records_than_the_capacity_are_no_space(fc: Companion) -> None:
+def test_more_records_than_the_capacity_are_refused_with_no_space(fc: Companion) -> None:
     assert fc.begin(ListIdentity(CAPACITY + 1, 1)) == Staged(ReplyStatus.NO_SPACE, 0, 0)
 
 
@@ -328,7 +328,7 @@ def begin_until_refused(fc: Companion) -> tuple[int, ReplyStatus]:
     raise AssertionError("nothing is ever refused")
 
 
-def test_a_blank_slot_needs_no_erase(fc: Companion) -> None:
+def test_a_blank_slot_does_not_need_an_erase(fc: Companion) -> None:
     assert fc.begin(identify(NEW)).status is ReplyStatus.OK
     fc.device.cut_power_at(1)  # the next flash operation
     for records in (OLDER, NEW) * 100:

@@ -193,7 +193,7 @@ def test_a_command_of_another_program_names_what_exists(command: Command) -> Non
             assert word == CONNECTION
 
 
-def test_every_exception_is_needed_and_its_test_exists() -> None:
+def test_every_exception_is_needed_and_the_test_exists() -> None:
     used = {reason_not_to_run(command) for command in COMMANDS}
     assert [start for start, reason in NOT_RUN.items() if reason not in used] == []
     named = [path for reason in NOT_RUN.values() for path in re.findall(r"tests/\S+\.py", reason)]

@@ -12,7 +12,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "zenoh.md").read_text()
 SECTIONS = dict(re.findall(r"^##+ ([^\n]*)\n(.*?)(?=^##+ |\Z)", PAGE, re.MULTILINE | re.DOTALL))
 
 
-def test_the_table_has_every_key_and_its_version() -> None:
+def test_the_table_has_every_key_and_the_version() -> None:
     """But commands, which have tables of their own."""
     rows = re.findall(r"^\| (`[^|]*`) \| .* \| ([^|]*) \|$", SECTIONS[f"Keys, version {VERSION}"], re.MULTILINE)
     documented = {suffix: delivery for names, delivery in rows for suffix in re.findall(r"`([^`]*)`", names)}

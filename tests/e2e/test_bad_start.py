@@ -30,7 +30,7 @@ UNKNOWN = {
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
-def test_an_invalid_connection_is_one_sentence(tmp_path: Path, name: str) -> None:
+def test_an_invalid_connection_is_reported_in_one_sentence(tmp_path: Path, name: str) -> None:
     arguments, hint = UNKNOWN[name]
     ended = run_naze_bridge("run", *arguments, "--state-dir", str(tmp_path))
     assert ended.returncode == 2
@@ -66,7 +66,9 @@ def test_a_second_daemon_on_one_port_is_refused(start: Starter, tmp_path: Path) 
         ("udpin:203.0.113.1:14550", "this machine has no such address"),
     ],
 )
-def test_an_impossible_link_to_ground_stations_is_one_sentence(tmp_path: Path, link: str, advice: str) -> None:
+def test_an_impossible_link_to_ground_stations_is_reported_in_one_sentence(
+    tmp_path: Path, link: str, advice: str
+) -> None:
     assert_refused(run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", tmp_path), link, advice)
 
 

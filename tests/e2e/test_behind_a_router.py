@@ -33,7 +33,7 @@ async def serve(link: socket.socket) -> Bridge:
     return bridge
 
 
-async def test_mavsdk_proves_its_address_by_itself() -> None:
+async def test_mavsdk_proves_the_address_by_itself() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.bind(("127.0.0.1", 0))
         link.setblocking(False)

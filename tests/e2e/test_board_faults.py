@@ -115,7 +115,7 @@ def test_a_board_is_found_after_unplugging_during_a_write(bench: Bench, planner:
     assert lost is not None
 
 
-def test_a_board_left_in_its_command_line_is_reported(start: Starter) -> None:
+def test_a_board_left_in_the_command_line_is_reported(start: Starter) -> None:
     board = start.board()
     with board.link.open("r+b", buffering=0) as terminal:
         terminal.write(b"\r\r\r")
@@ -202,7 +202,7 @@ def test_a_board_at_an_unexpected_speed_is_found(start: Starter) -> None:
 # -- the daemon ----------------------------------------------------------------------------------------------
 
 
-def test_a_kill_right_after_the_ack_loses_nothing(start: Starter) -> None:
+def test_a_kill_right_after_the_ack_does_not_lose_anything(start: Starter) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
         station.send_heartbeat()

@@ -124,7 +124,7 @@ def test_mission_planners_tabs_write_read_and_clear(inav: Bench, tab: int, plan:
         assert len(planner.read()) == 2
 
 
-def test_mission_planner_shows_that_a_version_without_geozones_has_no_fence(start: Starter) -> None:
+def test_mission_planner_shows_that_a_version_without_geozones_does_not_have_a_fence(start: Starter) -> None:
     board = start.board("--kind", "inav", "--inav-version", "7.1.2", tcp=True)
     daemon = start.daemon(board.fc)
     daemon.wait()

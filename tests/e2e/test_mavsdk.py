@@ -197,7 +197,7 @@ async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> Non
         assert len(await missions.download_mission()) == 1
 
 
-async def test_setting_the_current_item_ends_and_blocks_no_later_call(shared: Bench) -> None:
+async def test_setting_the_current_item_ends_and_does_not_block_a_later_call(shared: Bench) -> None:
     plan = plain_plan(4)
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)

@@ -79,7 +79,7 @@ def test_every_request_while_connecting_is_answered(shared: Bench) -> None:
     assert planner.messages("HOME_POSITION")
 
 
-def test_the_vehicle_moves_on_its_map(shared: Bench) -> None:
+def test_the_vehicle_moves_on_the_map(shared: Bench) -> None:
     planner = shared.mission_planner()
     for kind in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "SYS_STATUS", "MISSION_CURRENT"):
         planner.wait_until(lambda: bool(planner.messages(kind)), kind)  # noqa: B023 - called at once
@@ -146,7 +146,7 @@ def test_a_read_of_float_items_shows_the_same_list(shared: Bench) -> None:
 
 
 @pytest.mark.parametrize(("count", "use_int"), [(12, False), (146, True)])
-def test_a_write_succeeds_although_its_loops_take_packets(shared: Bench, count: int, use_int: bool) -> None:
+def test_a_write_succeeds_although_the_loops_take_packets(shared: Bench, count: int, use_int: bool) -> None:
     planner = shared.mission_planner(own_loss=0.2, seed=count + use_int)
     plan = plain_plan(count, start=count)
     planner.write(plan, use_int=use_int)
@@ -324,7 +324,7 @@ def test_arming_ends_the_upload(bench: Bench) -> None:
     assert bench.board.records() == kept
 
 
-def test_its_arm_button_is_refused_with_a_reason(shared: Bench) -> None:
+def test_the_arm_button_is_refused_with_a_reason(shared: Bench) -> None:
     planner = shared.mission_planner()
     assert planner.arm() == messages.MAV_RESULT_DENIED
     planner.wait_for_text("disarm with the transmitter")
@@ -398,7 +398,7 @@ def test_a_late_duplicate_of_a_count_does_no_harm(shared: Bench) -> None:
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_an_item_sent_before_its_request_is_accepted(shared: Bench) -> None:
+def test_an_item_sent_before_the_request_is_accepted(shared: Bench) -> None:
     """For Mission Planner a stale ack of the previous upload means "continue"."""
     planner = shared.mission_planner()
     plan = plain_plan(20, start=180)

@@ -72,7 +72,7 @@ def test_links_come_and_go_while_the_others_continue(daemon: ConfiguredDaemon) -
     assert "config.needs_restart" not in daemon.log
 
 
-def test_an_occupied_port_affects_only_its_link(daemon: ConfiguredDaemon) -> None:
+def test_an_occupied_port_affects_only_the_link(daemon: ConfiguredDaemon) -> None:
     with udp_station(("127.0.0.1", daemon.port)) as taken:
         own_port = taken.own_address[1]
         daemon.write(f'{daemon.first_link}, "udpin:127.0.0.1:{own_port}"')
@@ -103,7 +103,7 @@ def test_write_access_is_not_changed_by_a_reload(daemon: ConfiguredDaemon) -> No
     assert '"taken_over": []' in daemon.log
 
 
-def test_an_invalid_file_changes_nothing_and_is_explained(daemon: ConfiguredDaemon) -> None:
+def test_an_invalid_file_does_not_change_anything_and_is_explained(daemon: ConfiguredDaemon) -> None:
     daemon.write("", "sysidd = 1")
     daemon.reload("config.rejected")
     assert "gcs is empty" in daemon.log
@@ -113,13 +113,13 @@ def test_an_invalid_file_changes_nothing_and_is_explained(daemon: ConfiguredDaem
         station.wait_for("HEARTBEAT")
 
 
-def test_a_missing_file_changes_nothing(daemon: ConfiguredDaemon, start: Starter) -> None:
+def test_a_missing_file_does_not_change_anything(daemon: ConfiguredDaemon, start: Starter) -> None:
     Path(start.directory / "config.toml").unlink()
     daemon.reload("config.rejected")
     assert daemon.stations() == []
 
 
-def test_a_pipe_in_place_of_the_file_delays_nothing(daemon: ConfiguredDaemon, start: Starter) -> None:
+def test_a_pipe_in_place_of_the_file_does_not_delay_anything(daemon: ConfiguredDaemon, start: Starter) -> None:
     Path(start.directory / "config.toml").unlink()
     os.mkfifo(start.directory / "config.toml")
     daemon.reload("config.rejected")

@@ -22,7 +22,7 @@ def _heartbeats(station: PlainStation, count: int) -> set[tuple[bool, int]]:
     return seen
 
 
-def test_the_craft_stays_armed_and_in_its_mode(start: Starter) -> None:
+def test_the_craft_stays_armed_and_in_the_mode(start: Starter) -> None:
     bench = start.bench("--tele-prot", "2")
     bench.board.set("boxes 128")
     time.sleep(2)  # the switch ranges are polled

@@ -69,7 +69,7 @@ def outcomes(start: Starter, daemon: DaemonProgram) -> list[str]:
     return [mission["outcome"] for mission in after.missions()]
 
 
-def test_a_push_close_to_its_end_is_finished(start: Starter) -> None:
+def test_a_push_close_to_the_end_is_finished(start: Starter) -> None:
     bench = start.bench()
     connection = push_begun(bench.daemon)
     assert bench.daemon.end() == 0

@@ -135,13 +135,13 @@ def test_applying_again_updates_the_core(workshop: Workshop) -> None:
     assert workshop.files() == patched
 
 
-def test_removing_a_patch_that_is_not_applied_changes_nothing(workshop: Workshop) -> None:
+def test_removing_a_patch_that_is_not_applied_does_not_change_anything(workshop: Workshop) -> None:
     assert workshop.run("--remove") == (0, "Tree: the patch is not in it, nothing to do\n")
 
 
 @pytest.mark.parametrize("remove", [False, True])
 @pytest.mark.parametrize("applied", [False, True])
-def test_another_tree_is_left_alone(workshop: Workshop, remove: bool, applied: bool) -> None:
+def test_another_tree_is_not_touched(workshop: Workshop, remove: bool, applied: bool) -> None:
     if applied:
         workshop.run()
     main = workshop.tree / "src" / "main.c"

@@ -39,7 +39,7 @@ def test_core_survives_power_cuts_under_sanitizers(build: str, cut_step: int) ->
     assert f"{flights} lists flown" in printed
 
 
-def test_core_passes_its_tests_on_an_emulated_cortex_m3() -> None:
+def test_core_passes_the_tests_on_an_emulated_cortex_m3() -> None:
     printed = make("test-arm")
     stack = re.search(r"(\d+) bytes at most", printed)
     assert stack is not None
@@ -91,7 +91,7 @@ def test_core_stays_small() -> None:
     assert all(column == 0 for size in (mission, slots, flight, steer) for column in size[1:])
 
 
-def test_fuzzer_finds_nothing_in_a_few_seconds() -> None:
+def test_fuzzer_does_not_find_anything_in_a_few_seconds() -> None:
     assert "stat::number_of_executed_units" in make("fuzz", "FUZZ_SECONDS=2")
 
 

@@ -133,7 +133,7 @@ def test_an_armed_vehicle_refuses_a_push_to_all(fleet: Fleet, tmp_path: Path) ->
         until(lambda: (swift.status() or {}).get("armed") is False, "the landing")
 
 
-def test_an_unknown_name_is_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_unknown_name_is_reported_in_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
     file = plan_file(tmp_path, plain_plan(4))
     for command in (["push", file], ["pull"]):
         ended = fleet.ask(*command, "--vehicle", "kita")
@@ -219,7 +219,7 @@ def test_the_subscriber_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
         reader.wait()
 
 
-def test_two_bridges_with_one_name_get_no_mission(fleet: Fleet, tmp_path: Path) -> None:
+def test_two_bridges_with_one_name_do_not_get_a_mission(fleet: Fleet, tmp_path: Path) -> None:
     other = fleet.start("other", name="owl")
     try:
         until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")

@@ -149,7 +149,7 @@ def refused(listed: subprocess.CompletedProcess[str]) -> str:
     return sentence
 
 
-def test_a_wrong_password_is_one_sentence(passwords: Fleet) -> None:
+def test_a_wrong_password_is_reported_in_one_sentence(passwords: Fleet) -> None:
     config = passwords.config("pilot", "pilot")
     config.write_text(config.read_text().replace("change-me", "guessed"))
     assert "check user, password" in refused(passwords.fleet_list(config))

@@ -16,7 +16,7 @@ from fleet.missions import Trial
         (Trial("kite", "rejected", 0, "1234abcd", 5, "1234abcd"), False, False),
     ],
 )
-def test_a_mission_is_held_if_it_is_taken_and_its_checksum_is_that_of_the_list(
+def test_a_mission_is_held_if_it_is_taken_and_the_checksum_is_that_of_the_list(
     trial: Trial, is_accepted: bool | None, is_held: bool | None
 ) -> None:
     assert (trial.is_accepted, trial.is_held) == (is_accepted, is_held)

@@ -19,14 +19,14 @@ _JSON = st.recursive(
 
 
 @given(data=st.dictionaries(st.sampled_from("abc"), _JSON), path=st.lists(st.sampled_from("abc"), min_size=1))
-def test_each_value_has_its_type_or_is_unknown(data: dict[str, Any], path: list[str]) -> None:
+def test_each_value_has_a_type_or_is_unknown(data: dict[str, Any], path: list[str]) -> None:
     assert isinstance(text(data, *path), str | None)
     assert isinstance(flag(data, *path), bool | None)
     assert not isinstance(number(data, *path), bool)
     assert not isinstance(whole(data, *path), bool | float)
 
 
-def test_a_value_is_found_below_its_path() -> None:
+def test_a_value_is_found_below_the_path() -> None:
     data = {"battery": {"voltage_v": 11.1, "cells": 3}, "armed": True}
     assert number(data, "battery", "voltage_v") == 11.1
     assert (whole(data, "battery", "cells"), whole(data, "battery", "voltage_v")) == (3, None)

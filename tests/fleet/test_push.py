@@ -30,7 +30,7 @@ def test_a_failure_does_not_affect_the_others() -> None:
     assert fleet.vehicles["a"].result == ACCEPTED["result"]
 
 
-def test_a_vehicle_that_disappears_after_its_success_has_not_failed() -> None:
+def test_a_vehicle_that_disappears_after_the_success_has_not_failed() -> None:
     fleet = push_to("a")
     fleet.replied("a", ACCEPTED)
     fleet.ended("a")
@@ -48,7 +48,7 @@ def test_a_missing_result_has_one_of_three_reasons() -> None:
     assert [word in reason for word, reason in zip(words, reasons, strict=True)] == [True] * 3
 
 
-def test_a_staged_push_begins_no_other_after_a_failure() -> None:
+def test_a_staged_push_does_not_begin_another_push_after_a_failure() -> None:
     fleet = push_to(*NAMES)
     begun = fleet.begin(NAMES, staged=True)
     assert next(begun) == "a"

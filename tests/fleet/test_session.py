@@ -39,7 +39,7 @@ def test_the_first_endpoint_to_answer_is_used(router: Router) -> None:
     assert listed.returncode == 0, listed
 
 
-def test_a_missing_router_is_one_sentence() -> None:
+def test_a_missing_router_is_reported_in_one_sentence() -> None:
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     reason = f"{endpoint}: no router is running there (connection refused)"
     assert sentence_of("list", "--connect", endpoint) == f"naze-bridge: cannot join the fleet: {reason}"
@@ -59,12 +59,12 @@ def test_a_file_that_is_not_a_mission_is_not_sent(tmp_path: Path) -> None:
     assert re.fullmatch(r"naze-bridge: .*plan.*\n", ended.stderr), ended.stderr
 
 
-def test_an_unusable_name_is_one_sentence() -> None:
+def test_an_unusable_name_is_reported_in_one_sentence() -> None:
     reason = sentence_of("enroll", "my plane", code=2)
     assert reason.startswith("naze-bridge: the name is 'my plane', with ' ' in it: make a name of letters")
 
 
-def test_an_unusable_folder_is_one_sentence(tmp_path: Path) -> None:
+def test_an_unusable_folder_is_reported_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     reason = sentence_of("enroll", "kite", "--folder", tmp_path / "file")
     assert reason.endswith("members.json cannot be read: Not a directory")

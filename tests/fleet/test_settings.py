@@ -19,7 +19,7 @@ def test_a_missing_setting_is_a_difference_only_on_the_same_firmware() -> None:
     assert variants([held("a", "X 1", p=1.0), held("c", "Y 1")]) == {}
 
 
-def test_single_precision_is_no_difference() -> None:
+def test_single_precision_is_not_a_difference() -> None:
     assert variants([held("a", "X 1", p=0.1), held("b", "X 1", p=0.10000000149011612)]) == {}
 
 

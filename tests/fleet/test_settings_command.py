@@ -73,7 +73,7 @@ def test_a_staged_restore_stops_at_the_first_failure(fleet: Fleet, tmp_path: Pat
     assert value(fleet, "owl", "p_pitch") == "35"
 
 
-def test_an_unreadable_file_is_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_unreadable_file_is_reported_in_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
     file = tmp_path / "bad.param"
     file.write_text("p_pitch;44\n")
     ended = fleet.ask("settings", "restore", file, "--all")

@@ -170,7 +170,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
     assert f"Architecture: {_HOST}\n" in described
 
 
-def test_its_libraries_are_for_its_architecture_and_both_pythons(package: Path) -> None:
+def test_the_libraries_are_for_the_architecture_and_both_pythons(package: Path) -> None:
     with _archive(package) as archive:
         # A file shared by both Pythons is a hard link without contents.
         libraries = [each for each in archive if each.name.endswith(".so") and each.isfile() and not each.islnk()]
@@ -193,7 +193,7 @@ def test_every_library_has_a_pinned_wheel(architecture: str, python: str, wheels
     assert [wheel for wheel in {*wheels.iterdir()} - before if not wheel.stem.endswith(machines)] == []
 
 
-def test_its_pages_have_no_broken_links(package: Path) -> None:
+def test_the_pages_do_not_have_a_broken_links(package: Path) -> None:
     files = files_of(package)
     with _archive(package) as archive:
         for member in archive:
@@ -206,7 +206,7 @@ def test_its_pages_have_no_broken_links(package: Path) -> None:
                 assert target in files or f"{target}/" in files, f"{member.name}: {link}"
 
 
-def test_the_package_has_no_paths_of_the_build_machine(package: Path) -> None:
+def test_the_package_does_not_have_paths_of_the_build_machine(package: Path) -> None:
     with _archive(package) as archive:
         for member in archive:
             content = archive.extractfile(member) if member.isfile() else None
@@ -262,7 +262,7 @@ def test_it_is_installed_used_upgraded_removed_and_purged(
 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("system", ["bookworm", "trixie"])
-def test_in_a_bare_root_a_card_sets_itself_up_and_leaves_no_secret(
+def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     package: Path, root: BareRoot, tmp_path: Path, system: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(card, "_ARCHITECTURES", (_HOST,))

@@ -74,7 +74,7 @@ def test_a_board_may_be_plugged_in_after_the_start(driver: str) -> None:
         assert any(line.startswith(order) and f"modprobe@{driver}.service" in line for line in settings())
 
 
-def test_each_permission_has_its_reason() -> None:
+def test_each_permission_has_a_reason() -> None:
     """The comments name every permission that systemd-analyze finds open."""
     comments = " ".join(line[1:] for line in _UNIT.read_text().splitlines() if line.startswith("#"))
     for door in (

@@ -104,7 +104,7 @@ def test_a_version_comes_from_the_tag_and_the_commits_after_it(clone: Clone) -> 
     assert clone.version().startswith(f"7.1.1.dev2+g{commit}")
 
 
-def test_without_git_an_archive_has_its_commits_version_or_the_newest_releases(clone: Clone, tmp_path: Path) -> None:
+def test_without_git_an_archive_has_the_commits_version_or_the_newest_releases(clone: Clone, tmp_path: Path) -> None:
     clone.run("git", "tag", "7.1.0")
     folder = tmp_path / "archive"
     folder.mkdir()

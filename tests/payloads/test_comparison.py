@@ -59,7 +59,7 @@ def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:
             assert same == (name not in row["changes"]), (name, row)
 
 
-def test_filled_in_defaults_are_no_changes_but_keep_their_reasons() -> None:
+def test_filled_in_defaults_are_not_changes_but_keep_their_reasons() -> None:
     sent = [
         replace(HOME, p2=0.0),
         replace(HOME, seq=1, frame=3, p2=0.0, alt_m=20.0),

@@ -27,5 +27,5 @@ def test_the_trouble_of_each_endpoint_is_named() -> None:
     assert second.startswith(f"{wrong}: this is not an endpoint")
 
 
-def test_an_error_of_zenoh_is_one_line_without_its_source() -> None:
+def test_an_error_of_zenoh_is_one_line_without_the_source() -> None:
     assert in_short(ValueError("no\n such  key at /home/x/zenoh/lib.rs:12.")) == "no such key"

@@ -8,7 +8,7 @@ def test_no_two_keys_are_alike() -> None:
     assert len({key.suffix for key in KEYS}) == len(KEYS)
 
 
-def test_a_wildcard_over_telemetry_reaches_no_command_and_no_mavlink() -> None:
+def test_a_wildcard_over_telemetry_does_not_reach_a_command_or_mavlink() -> None:
     """zenoh's `**` matches no chunk that begins with @."""
     assert all(key.suffix.startswith("@") for key in (*COMMAND_KEYS, MAVLINK_IN))
     assert {key for key in KEYS if key.query_kind is QueryKind.COMMAND} == set(COMMAND_KEYS)
@@ -16,5 +16,5 @@ def test_a_wildcard_over_telemetry_reaches_no_command_and_no_mavlink() -> None:
     assert not any(key.is_published for key in (*COMMAND_KEYS, MAVLINK_IN))
 
 
-def test_a_key_names_its_vehicle() -> None:
+def test_a_key_names_the_vehicle() -> None:
     assert all(vehicle_in(full("fleet", "kite", key.suffix)) == "kite" for key in KEYS)

@@ -37,7 +37,7 @@ def test_infinity_is_json_too() -> None:
     [(POINT | {"seq": 70000}, "seq"), (POINT | {"command": True}, "command"), (POINT | {"p1": "high"}, "p1"),
      (POINT | {"lat_e7": 45.5}, "lat_e7"), ([], "item")],
 )  # fmt: skip
-def test_a_bad_item_is_refused_by_the_name_of_its_field(entry: Any, named: str) -> None:
+def test_a_bad_item_is_refused_by_the_name_of_the_field(entry: Any, named: str) -> None:
     with pytest.raises(ValueError, match=named):
         mission_items([entry])
 

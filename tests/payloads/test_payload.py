@@ -5,7 +5,7 @@ from payloads.keys import EVENT, STATE, STATUS
 from payloads.payload import Payloads, decoded, encoding_of
 
 
-def test_a_reply_reads_back_by_its_encoding() -> None:
+def test_a_reply_reads_back_by_the_encoding() -> None:
     payloads = Payloads(lambda: 1790000000.5)
     read = decoded(payloads.reply(STATE, {"vehicle": "kite"}), str(encoding_of(STATE)))
     assert read == {"v": 1, "seq": 0, "time_s": 1790000000.5, "vehicle": "kite"}

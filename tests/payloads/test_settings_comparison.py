@@ -50,7 +50,7 @@ def test_the_difference_is_symmetric(left: dict[str, float], right: dict[str, fl
 @pytest.mark.parametrize(
     "data", [None, [], {"a": True}, {"a": math.nan}, {"a": math.inf}, {f"a{n}": n for n in range(1501)}]
 )
-def test_plain_data_that_is_no_table_is_refused(data: object) -> None:
+def test_plain_data_that_is_not_a_table_is_refused(data: object) -> None:
     with pytest.raises(ValueError, match="must be"):
         setting_values(data)
 

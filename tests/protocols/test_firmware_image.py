@@ -76,7 +76,7 @@ def test_only_a_patched_harakiri_may_be_flashed(program: bytes, why: str) -> Non
     check_patched(PATCHED)
 
 
-def test_the_patch_is_recognised_by_its_own_table_and_ends_where_its_sources_say() -> None:
+def test_the_patch_is_recognised_by_its_own_table_and_ends_where_the_sources_say() -> None:
     firmware = Path(__file__).parents[2] / "firmware"
     words = ", ".join(f"0x{word:08X}u" for word in struct.unpack("<4I", PATCH_MARK))
     assert words in (firmware / "naze_slots.c").read_text()

@@ -47,7 +47,7 @@ def test_a_text_is_a_comment_to_ground_stations() -> None:
     assert read_param_file(text.replace("\n", "\r\n").encode(), "x").values == {"name": "Kite, 2", "p": 1.0}
 
 
-def test_a_value_that_is_no_number_is_left_out() -> None:
+def test_a_value_that_is_not_a_number_is_left_out() -> None:
     assert write_param_file({"a": math.nan, "b": 1.0}) == "b,1\n"
 
 
@@ -83,7 +83,7 @@ def test_a_comment_may_be_in_any_encoding(encoding: str) -> None:
     assert read_param_file("# f\u00fcr den S\u00fcdhang\nA,1\n".encode(encoding), "x").values == {"A": 1.0}
 
 
-def test_a_repeated_equal_line_is_no_error() -> None:
+def test_a_repeated_equal_line_is_not_an_error() -> None:
     assert read_param_file(b"A,1\nA,1.0\n", "x").values == {"A": 1.0}
 
 

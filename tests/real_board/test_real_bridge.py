@@ -145,7 +145,7 @@ def joined_texts(station: GroundStation) -> str:
     return " ".join(station.texts())
 
 
-def test_the_cli_is_recognised_and_left_alone(world: World, station: GroundStation, figure: Figure) -> None:
+def test_the_cli_is_recognised_and_not_touched(world: World, station: GroundStation, figure: Figure) -> None:
     world.run(_SETTLED_S)
     world.naze.receive(b"\r\r\r", world.now)
     began = world.now

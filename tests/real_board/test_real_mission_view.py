@@ -201,7 +201,7 @@ def test_a_flown_mission_is_seen_as_it_is(image: Image, figure: Figure, tele_pro
 
 
 @pytest.mark.parametrize("tele_prot", [0, 2])
-def test_a_stop_is_seen_with_its_reason(image: Image, figure: Figure, tele_prot: int) -> None:
+def test_a_stop_is_seen_with_the_reason(image: Image, figure: Figure, tele_prot: int) -> None:
     """The pilot moves the roll stick on the way to the second place."""
     flight = Flight(image, tele_prot)
     flight.take_off()

@@ -79,7 +79,7 @@ def test_a_setting_is_set_saved_and_there_after_a_power_cycle(world: World, figu
     figure("set, saved, and read after a power cycle", kept)
 
 
-def test_every_setting_out_of_range_is_refused_and_its_own_value_changes_nothing(world: World) -> None:
+def test_every_setting_out_of_range_is_refused_and_its_own_value_does_not_change_anything(world: World) -> None:
     client = SettingsClient(world)
     table = client.wait_read()
     for setting in table:

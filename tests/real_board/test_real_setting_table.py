@@ -104,7 +104,7 @@ def test_every_setting_equals_the_cli(settable: RealBench, figure: Figure) -> No
         assert float(value) == pytest.approx(held.value, abs=_PRINTED)
 
 
-def test_every_setting_takes_its_range_and_nothing_else(settable: RealBench, figure: Figure) -> None:
+def test_every_setting_takes_only_the_values_in_range(settable: RealBench, figure: Figure) -> None:
     bench = settable
     taken = refused = 0
     flash = bytes(bench.flash)
@@ -186,7 +186,7 @@ def test_another_size_is_refused(settable: RealBench) -> None:
     assert (configuration(bench), bytes(bench.flash)) == (before, flash)
 
 
-def test_armed_nothing_is_read_set_or_saved(settable: RealBench, figure: Figure) -> None:
+def test_armed_it_does_not_read_anything_set_or_saved(settable: RealBench, figure: Figure) -> None:
     bench = settable
     settings, checksum = settings_of(bench), table(bench).checksum
     bench.arm()

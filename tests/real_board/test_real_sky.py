@@ -34,7 +34,7 @@ def ready(image: Image, wind: float = 0.0, seed: int = 1, factor: float = 1.0, *
 
 
 @pytest.mark.parametrize(("wind", "limit"), [(0.0, 0.05), (5.0, 0.12)])
-def test_it_holds_its_height(image: Image, figure: Figure, wind: float, limit: float) -> None:
+def test_it_holds_the_height(image: Image, figure: Figure, wind: float, limit: float) -> None:
     pilot = ready(image, wind)
     pilot.arm()
     pilot.take_off(10.0)
@@ -49,7 +49,7 @@ def test_it_holds_its_height(image: Image, figure: Figure, wind: float, limit: f
 
 @pytest.mark.parametrize("factor", [1.0, 2.0])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_it_holds_its_place_in_wind(image: Image, figure: Figure, seed: int, factor: float) -> None:
+def test_it_holds_the_place_in_wind(image: Image, figure: Figure, seed: int, factor: float) -> None:
     pilot = ready(image, 5.0, seed, factor)
     pilot.arm()
     pilot.take_off(10.0)

@@ -157,7 +157,7 @@ def test_a_leg_is_flown_at_the_speed_that_is_said(sitl: Sitl, asked_cm_s: int, f
 
 
 @pytest.mark.parametrize("lands", [False, True])
-def test_a_return_lands_only_if_its_param1_says_so(sitl: Sitl, lands: bool) -> None:
+def test_a_return_lands_only_if_the_param1_says_so(sitl: Sitl, lands: bool) -> None:
     records = leg(40), NavRecord(NavAction.RTH, p1=int(lands))
     sitl.configure(nav_auto_speed=1000)
     fly(sitl, records)

@@ -56,7 +56,7 @@ from tests.support.rule_items import (
         ),
     ],
 )
-def test_each_finding_has_its_text(finding: Finding, text: str) -> None:
+def test_each_finding_has_a_text(finding: Finding, text: str) -> None:
     assert finding.text() == text
 
 
@@ -106,7 +106,7 @@ def test_a_filled_in_default_is_not_reported() -> None:
     assert finding_lines(verdict.findings) == []
 
 
-def test_a_list_without_home_reports_its_first_item_as_home() -> None:
+def test_a_list_without_home_reports_the_first_item_as_home() -> None:
     """As sent by MAVSDK's `mission` plugin."""
     verdict = check_list([item(WAYPOINT, frame=6), item(WAYPOINT)], HarakiriRules())
     assert [each.text() for each in verdict.findings] == ["Home: item 0 became home, not flown to"]

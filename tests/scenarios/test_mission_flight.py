@@ -86,7 +86,7 @@ def test_records_reached_between_two_reports_are_all_announced() -> None:
 
 
 @pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
-def test_a_second_flight_announces_its_records_again(tele_prot: TelemetryProtocol) -> None:
+def test_a_second_flight_announces_the_records_again(tele_prot: TelemetryProtocol) -> None:
     flight = Flight(tele_prot)
     flight.reports(LEG)
     flight.reports(replace(LEG, record=2, reached=1))
@@ -138,7 +138,7 @@ def test_take_off_and_landing_are_shown(tele_prot: TelemetryProtocol) -> None:
 
 
 @pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
-def test_a_stopped_flight_is_paused_and_the_mode_is_that_of_its_boxes(tele_prot: TelemetryProtocol) -> None:
+def test_a_stopped_flight_is_paused_and_the_mode_is_that_of_the_boxes(tele_prot: TelemetryProtocol) -> None:
     flight = Flight(tele_prot)
     flight.reports(LEG)
     flight.faults.boxes = LEVEL | HOLD
@@ -184,7 +184,7 @@ def test_a_list_that_ends_with_the_landing_is_complete(tele_prot: TelemetryProto
     assert flight.landed_state == ON_GROUND
 
 
-def test_disarming_in_the_air_completes_nothing() -> None:
+def test_disarming_in_the_air_does_not_complete_anything() -> None:
     flight = Flight()
     flight.reports(replace(LEG, record=4, reached=3))
     flight.reports(FlightProgress(record=4, reached=3, reason=FlightReason.DISARMED))
@@ -234,7 +234,7 @@ def test_a_board_without_mission_flight_is_asked_twice() -> None:
     assert asked(world) == 2
 
 
-def test_the_switch_alone_flies_nothing() -> None:
+def test_the_switch_alone_does_not_fly_anything() -> None:
     """In MAVLink only the pilot's switches are known; this board has no mission flight."""
     world = World(SimOptions(tele_prot=MAVLINK), faults := Faults(boxes=LEVEL | SWITCH))
     world.wait_ready()

@@ -72,7 +72,7 @@ def test_the_final_ack_never_meets_the_next_transfer(first_seed: int, kind: str)
 
 
 @pytest.mark.parametrize("first_seed", [20, 140, 280])
-def test_an_abandoned_list_is_never_mixed_with_the_next_one(first_seed: int) -> None:
+def test_an_abandoned_list_is_never_mixed_with_the_next(first_seed: int) -> None:
     """Both have the same home and length, on a link that delays and doubles many messages.
 
     Its user begins the second one after the failure of the first, on a dead link.

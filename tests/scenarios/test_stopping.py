@@ -73,7 +73,7 @@ def test_a_push_may_be_aborted_at_any_moment(world: World, seed: int) -> None:
     world.assert_line_was_clean()
 
 
-def test_a_board_that_does_not_answer_keeps_its_old_list() -> None:
+def test_a_board_that_does_not_answer_keeps_the_old_list() -> None:
     faults = Faults()
     world = World(SimOptions(boot_ms=500), faults, speeds=(115200,), flash=flash_holding(records_of(OLD)))
     world.wait_ready()

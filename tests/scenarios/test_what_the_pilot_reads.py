@@ -84,7 +84,7 @@ def times_shown(screens: Screens, text: str, began: float) -> int:
 
 
 class TestConnecting:
-    def test_a_healthy_craft_shows_nothing(self) -> None:
+    def test_a_healthy_craft_does_not_show_anything(self) -> None:
         world = World(speeds=(115200,))
         world.wait_ready()
         _, screens = connected(world, 0)
@@ -93,7 +93,7 @@ class TestConnecting:
             assert glance.qgc == "Ready"
         assert screens.mission_planner.heard() == []
 
-    def test_a_board_that_is_never_found_is_no_ready_vehicle(self) -> None:
+    def test_a_board_that_is_never_found_is_not_a_ready_vehicle(self) -> None:
         world = World(speeds=(115200,), powered=False)
         _, screens = connected(world, 0)
         first, ninth, last = screens.look()
@@ -107,7 +107,7 @@ class TestConnecting:
         assert screens.mission_planner.heard() == [NOT_FOUND]
         assert screens.mission_planner.line.longest_gap_s(12, world.now) < 1.1
 
-    def test_no_receiver_is_missing_before_its_channels_are_read(self) -> None:
+    def test_no_receiver_is_missing_before_the_channels_are_read(self) -> None:
         """Mission Planner's "NO RC Receiver" was also shown while nothing asked the board for its channels."""
         world, station, screens = on_the_ground()
         ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, m.MAVLINK_MSG_ID_RC_CHANNELS, -1, 0, 0, 0, 0, 0))
@@ -181,7 +181,7 @@ class TestLostFlightController:
         assert [glance.hud.split(" after")[0] for glance in screens.look()] == ["Flight controller back"] * 2 + [""]
 
     @pytest.mark.parametrize("protocol", TelemetryProtocol)
-    def test_a_change_of_protocol_on_arming_is_no_loss(self, protocol: TelemetryProtocol) -> None:
+    def test_a_change_of_protocol_on_arming_is_not_a_loss(self, protocol: TelemetryProtocol) -> None:
         world = World(SimOptions(tele_prot=protocol))
         world.wait_ready()
         _, screens = connected(world)
@@ -266,7 +266,7 @@ class TestWritingMissions:
         assert screens.glance().hud == "Unhealthy GPS Signal"
         return world, station, screens
 
-    def test_a_verified_mission_is_no_warning(self) -> None:
+    def test_a_verified_mission_is_not_a_warning(self) -> None:
         _, station, screens = on_the_ground()
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
         assert all(is_quiet(glance) for glance in screens.look())
@@ -346,7 +346,7 @@ class TestWritingMissions:
         assert station.texts()[-1].startswith("9 of 9 stored: check home")
 
     @pytest.mark.parametrize("radius_cm", [3000.0, 199.949])
-    def test_what_follows_a_write_raises_no_error(self, radius_cm: float) -> None:
+    def test_what_follows_a_write_does_not_raise_an_error(self, radius_cm: float) -> None:
         """Its default radius of 30 m, or 6.56 ft for 2 m; 10 s later PREFLIGHT_STORAGE, perhaps in flight."""
         world, station, screens = on_the_ground()
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
@@ -394,7 +394,7 @@ class TestRestart:
         assert not any(glance.failsafe for glance in screens.look())
 
 
-def test_a_mission_of_an_inav_is_told_in_the_words_of_its_osd() -> None:
+def test_a_mission_of_an_inav_is_told_in_the_words_of_the_osd() -> None:
     """QGroundControl says them; the HUD of Mission Planner stays free for what has gone wrong."""
     world, station, screens = inav()
     home = world.bridge.vehicle.home
@@ -433,7 +433,7 @@ def test_a_deleted_rally_points_landing_approach_is_read_in_full() -> None:
     assert screens.mission_planner.texts(began)[-1] == screens.glance().hud == summary
 
 
-def test_once_after_its_first_write_a_station_hears_that_only_missions_are_stored() -> None:
+def test_once_after_the_first_write_a_station_hears_that_only_missions_are_stored() -> None:
     world, station, screens = on_the_ground()
     for _ in range(2):
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED

@@ -157,7 +157,7 @@ def test_an_intact_log_is_applied(path: Path, killed: bytes) -> None:
         assert len(store.list(99)) == MISSIONS + 2
 
 
-def test_a_damaged_main_file_keeps_its_log(path: Path, killed: bytes) -> None:
+def test_a_damaged_main_file_keeps_the_log(path: Path, killed: bytes) -> None:
     # Not at its start: for those pages the log holds newer copies.
     damaged = path.read_bytes()[:30_000]
     path.write_bytes(damaged)

@@ -85,7 +85,7 @@ def test_a_file_name_that_is_not_utf8_is_stored(store: MissionStore) -> None:
 
 
 @pytest.mark.parametrize("items", ["[" * 100_000, "no JSON"])
-def test_contents_that_are_no_mission_are_damage(store: MissionStore, tmp_path: Path, items: str) -> None:
+def test_contents_that_are_not_a_mission_are_damage(store: MissionStore, tmp_path: Path, items: str) -> None:
     """The checksum is right: a service that was taken over can make it, and root reads the store."""
     number = store.add(mission(1))
     with closing(sqlite3.connect(tmp_path / "missions.db")) as database:
@@ -191,7 +191,7 @@ def test_lookups_take_no_more_steps_in_a_larger_store(store: MissionStore) -> No
     assert all(steps(search) <= before for search, before in zip(searches, few, strict=True))
 
 
-def test_each_sender_is_found_with_its_item_numbers_until_it_reads_the_list(store: MissionStore) -> None:
+def test_each_sender_is_found_with_the_item_numbers_until_it_reads_the_list(store: MissionStore) -> None:
     received = mission(1)
     for sender, last in (("a", 2), ("b", 3), ("a", 4), ("", 5), ("c", 6)):
         number = store.add(replace(received, sent_seqs=[0, last]), sender)

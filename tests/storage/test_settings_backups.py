@@ -22,7 +22,7 @@ def backups() -> Iterator[SettingsBackups]:
         yield store.backups
 
 
-def test_a_backup_reads_back_with_its_line(backups: SettingsBackups) -> None:
+def test_a_backup_reads_back_with_the_line(backups: SettingsBackups) -> None:
     number = backups.add("a", "Harakiri", TABLE, 5.0, "first met")
     found = backups.get(number)
     assert found is not None

@@ -9,7 +9,7 @@ import pytest
 from storage.small_files import read_bounded
 
 
-def test_a_file_is_read_up_to_its_maximum_size(tmp_path: Path) -> None:
+def test_a_file_is_read_up_to_the_maximum_size(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(bytes(1024))
     assert read_bounded(path, 1024) == bytes(1024)

@@ -34,7 +34,9 @@ while True:
 """
 
 
-def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kill_9_does_not_lose_anything_that_was_acknowledged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "missions.db"
     chance = random.Random(1)
     acknowledged: dict[int, str] = {}
@@ -103,7 +105,7 @@ def test_a_power_cut_damages_only_unacknowledged_data(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 1, 31, 32, 4096])
-def test_a_power_cut_before_the_first_commit_is_no_damage(tmp_path: Path, size: int) -> None:
+def test_a_power_cut_before_the_first_commit_is_not_damage(tmp_path: Path, size: int) -> None:
     """The log was created but never written: its bytes are zeros."""
     path = tmp_path / "missions.db"
     with open_store(path, now=0.0).store as store:

@@ -144,7 +144,7 @@ def test_the_settings_are_printed_before_the_boot_loader_starts() -> None:
     assert bench.board.power is Power.BOOTLOADER
 
 
-def test_an_armed_board_opens_no_command_line() -> None:
+def test_an_armed_board_does_not_open_a_command_line() -> None:
     bench = booted()
     assert isinstance(bench.board, SimulatedNaze)
     bench.board.faults.armed = True
@@ -155,6 +155,6 @@ def test_an_armed_board_opens_no_command_line() -> None:
     assert bench.board.armed
 
 
-def test_the_settings_in_a_dump_are_its_numbers() -> None:
+def test_the_settings_in_a_dump_are_the_numbers() -> None:
     dump = "Config:\nFW: x = 3 y\n00|ANGLE   : ---\nrc_db = 20\nrc_trm_rll =  -0.500\nEnabled features: PPM\n"
     assert settings_in(dump) == {"rc_db": 20.0, "rc_trm_rll": -0.5}

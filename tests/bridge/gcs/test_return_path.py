@@ -58,7 +58,7 @@ def is_served(station: GroundStation) -> bool:
 @pytest.mark.parametrize("address", [FAR, NEAR])
 @pytest.mark.parametrize("has_key", [False, True])
 @pytest.mark.parametrize("version", [1, 2])
-def test_one_forged_datagram_causes_at_most_three_times_its_size(
+def test_one_forged_datagram_causes_at_most_three_times_the_size(
     address: tuple[str, int], version: int, *, has_key: bool
 ) -> None:
     world = world_with({"udp": LinkAccess(Signing(KEY, Timestamps(lambda: NOON)))} if has_key else None)
@@ -87,7 +87,7 @@ def test_a_forged_address_behind_a_router_never_gets_more(version: int) -> None:
     assert len(world.events("gcs.refused")) == 1
 
 
-def test_an_address_on_an_own_network_is_served_from_its_second_heartbeat_on() -> None:
+def test_an_address_on_an_own_network_is_served_from_the_second_heartbeat_on() -> None:
     world = world_with()
     station, known = GroundStation(world, NEAR), GroundStation(world, "needs no proof", sysid=254)
     for each in (station, known):
@@ -139,7 +139,7 @@ def test_a_signature_is_a_proof() -> None:
     assert is_served(station)
 
 
-def test_connections_and_configured_addresses_need_no_proof() -> None:
+def test_connections_and_configured_addresses_do_not_need_to_prove_themselves() -> None:
     world = world_with()
     configured, connected = (GroundStation(world, (f"198.51.100.{each}", 14550)) for each in (8, 9))
     world.bridge.add_default_peer(configured.peer)
@@ -183,7 +183,9 @@ def new_ports(_draw: random.Random) -> Callable[[], Address]:
 
 
 @pytest.mark.parametrize("addresses", [new_hosts, new_ports])
-def test_a_flood_keeps_no_pilot_from_writing(addresses: Callable[[random.Random], Callable[[], Address]]) -> None:
+def test_a_flood_does_not_keep_a_pilot_from_writing(
+    addresses: Callable[[random.Random], Callable[[], Address]],
+) -> None:
     """Two thousand lists a second are announced. One pilot is connected before, another connects meanwhile."""
     world = world_with()
     pilot, late = (GroundStation(world, (f"192.168.4.{each}", 14550)) for each in (2, 3))

@@ -127,7 +127,7 @@ def is_harmless(message: Message, *, may_write: bool) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_stranger_on_an_open_link_moves_and_silences_nothing(seed: int) -> None:
+def test_a_stranger_on_an_open_link_neither_moves_nor_silences_the_craft(seed: int) -> None:
     world, autopilot = passing({})
     second, stranger = GroundStation(world, "second", sysid=SECOND_VEHICLE), GroundStation(world, "stranger")
     keep_alive(second)

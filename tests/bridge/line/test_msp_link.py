@@ -90,7 +90,7 @@ def test_lost_bytes_do_not_overflow_the_ring(rate: float, extension: bool) -> No
 @pytest.mark.parametrize("hang_s", [0.3, 1.0, 1.6, 2.0, 2.4, 2.8])
 @pytest.mark.parametrize("baud", [115200, 9600, 1200])
 @pytest.mark.parametrize("extension", [True, False])
-def test_the_backlog_of_a_stalled_board_fits_its_ring(hang_s: float, baud: int, extension: bool) -> None:
+def test_the_backlog_of_a_stalled_board_fits_the_ring(hang_s: float, baud: int, extension: bool) -> None:
     """It answers everything at once when it resumes: requests, repeats and the probes of the new search."""
     for seed in range(2):
         draw = random.Random(seed)
@@ -136,7 +136,7 @@ def test_requests_wait_for_room_for_their_replies() -> None:
     assert sent(link) == [195]
 
 
-def test_a_timed_out_request_counts_until_its_reply_can_no_longer_come() -> None:
+def test_a_timed_out_request_counts_until_the_reply_can_no_longer_come() -> None:
     link = MspLink(115200, [], 0.0)
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
@@ -213,7 +213,7 @@ def test_a_reply_ends_earlier_requests() -> None:
     assert link.requests_lost == 2
 
 
-def test_nothing_is_sent_alongside_an_exclusive_request() -> None:
+def test_does_not_send_anything_alongside_an_exclusive_request() -> None:
     link = MspLink(115200, [], 0.0)
     link.send(question(191, 7, exclusive=True), 0.0)
     link.send(question(101, 11), 0.0)

@@ -134,7 +134,7 @@ def test_an_accepted_list_is_stored_and_read_back_by_all(craft: Craft) -> None:
     assert Download(another).run(TIMEOUT_S) == craft.download()
 
 
-def test_writing_a_read_list_again_changes_nothing(craft: Craft) -> None:
+def test_writing_a_read_list_again_does_not_change_anything(craft: Craft) -> None:
     assert craft.upload(craft.plan(12)) is ACCEPTED
     before = craft.pull()
     assert craft.upload(craft.download()) is ACCEPTED
@@ -160,7 +160,7 @@ def test_a_cleared_list_reads_as_empty_and_can_be_replaced(craft: Craft) -> None
     assert craft.holds(craft.plan(7))
 
 
-def test_a_rejected_list_changes_nothing_and_has_a_reason(craft: Craft) -> None:
+def test_a_rejected_list_does_not_change_anything_and_has_a_reason(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     good = craft.plan(6, 1)
     for bad in (
@@ -200,7 +200,7 @@ def test_item_by_item_and_whole_list_checks_agree(craft: Craft) -> None:
             assert [item.seq for item in whole.items] == list(range(len(whole.items)))
 
 
-def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
+def test_does_not_send_to_an_armed_craft(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     craft.arm()
     assert craft.upload(craft.plan(8, 1)) is DENIED
@@ -214,7 +214,7 @@ def test_nothing_is_sent_to_an_armed_craft(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize("craft", [multiwii.PROFILE.name], indirect=True)
-def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
+def test_an_armed_craft_is_not_asked_for_the_list(craft: Craft) -> None:
     craft.arm()
     craft.world.inside.missions.held = None
     answers: list[HeldMission | Refusal] = []
@@ -226,7 +226,7 @@ def test_an_armed_craft_is_not_asked_for_its_list(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.3, 0.6])
-def test_a_push_that_loses_its_line_ends_with_a_true_result(craft: Craft, moment: float) -> None:
+def test_a_push_that_loses_the_line_ends_with_a_true_result(craft: Craft, moment: float) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     outcome = craft.world.push(craft.plan(60, 1))
     craft.world.run(moment)

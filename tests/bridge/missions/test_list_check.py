@@ -61,7 +61,7 @@ def test_a_single_item_of_zeros_clears_for_mavsdk() -> None:
 
 
 @pytest.mark.parametrize("capacity", [2, 120, 146])
-def test_more_than_the_capacity_is_no_space(capacity: int) -> None:
+def test_more_than_the_capacity_is_refused_with_no_space(capacity: int) -> None:
     profile = HarakiriRules(capacity=capacity)
     full = mission(*[item(WAYPOINT)] * (capacity - 1))
     assert check_list(full, profile).result is Result.ACCEPTED
@@ -102,7 +102,7 @@ def test_homes_own_coordinates_take_precedence() -> None:
 
 
 @pytest.mark.parametrize("frame", [0, 5, 10, 11])
-def test_homes_height_is_kept_whatever_its_frame(frame: int) -> None:
+def test_homes_height_is_kept_regardless_of_the_frame(frame: int) -> None:
     verdict = check_list([replace(HOME, frame=frame, alt_m=584.0), item(WAYPOINT)], PROFILE)
     assert (verdict.items[0].frame, verdict.items[0].alt_m) == (0, 584.0)
     # Relative to the terrain: it is probably no home.
@@ -140,7 +140,7 @@ def test_home_without_a_finite_height_rejects_the_list(height: float) -> None:
         (5, item(SET_ROI)),
     ],
 )
-def test_a_rejection_comes_with_its_item_and_is_final(seq: int, faulty: MissionItem) -> None:
+def test_a_rejection_comes_with_the_item_and_is_final(seq: int, faulty: MissionItem) -> None:
     items = [HOME] + [item(WAYPOINT)] * 5
     items[seq] = faulty
     check = HarakiriCheck(PROFILE, len(items))
@@ -153,7 +153,7 @@ def test_a_rejection_comes_with_its_item_and_is_final(seq: int, faulty: MissionI
     assert (verdict.result, verdict.findings[-1]) == (Result.REJECTED, answers[seq].finding)  # type: ignore[union-attr]
 
 
-def test_an_incomplete_list_has_no_verdict() -> None:
+def test_an_incomplete_list_does_not_have_a_verdict() -> None:
     check = HarakiriCheck(PROFILE, 3)
     check.take(HOME)
     check.take(item(WAYPOINT))

@@ -17,7 +17,7 @@ def test_before_a_board_is_found_none_are_stored() -> None:
     assert not lists.are_stored
 
 
-def test_a_lost_board_that_stores_them_is_no_board_without() -> None:
+def test_a_lost_board_that_stores_them_is_not_a_board_without() -> None:
     _, world, station = board_with()
     world.unplug()
     world.run(6)

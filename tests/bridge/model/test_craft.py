@@ -32,7 +32,7 @@ _SHOWN = {
 
 
 @pytest.mark.parametrize(("number", "mixer"), list(enumerate(_MIXERS, 1)))
-def test_a_mixer_is_shown_as_its_kind_of_aircraft_or_as_a_quadrocopter(number: int, mixer: str) -> None:
+def test_a_mixer_is_shown_as_the_kind_of_aircraft_or_as_a_quadrocopter(number: int, mixer: str) -> None:
     expected = next((shown for begin, shown in _SHOWN.items() if mixer.startswith(begin)), "QUADROTOR")
     assert airframe(number).name == expected
 

@@ -47,7 +47,7 @@ def test_a_leg_passes_its_own_ends(start: Place, end: Place, share: float) -> No
     assert 0 <= bearing_deg(start, end) < 360
 
 
-def test_a_place_beside_a_leg_is_as_far_as_its_nearest_point() -> None:
+def test_a_place_beside_a_leg_is_as_far_as_the_nearest_point() -> None:
     start, end = Place(), Place(LAT + 100 * METRE)
     beside = Place(LAT + 50 * METRE, LON + 2000)
     assert passing_distance_m(start, end, beside) == pytest.approx(distance_m(Place(beside.lat_e7), beside), rel=0.01)

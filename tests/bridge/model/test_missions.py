@@ -13,7 +13,7 @@ def status(number: int, action: int = NavAction.WAYPOINT, *, mode: int = NavMode
     return NavStatus(mode, state, action, number, error, 0)
 
 
-def test_a_record_is_reached_once_when_the_next_one_is_flown_to() -> None:
+def test_a_record_is_reached_once_when_the_next_is_flown_to() -> None:
     progress = MissionProgress()
     assert [progress.take(status(number)) for number in (1, 1, 2, 2, 4)] == [(), (), (1,), (), (2,)]
     assert (progress.number, progress.progress) == (4, Progress.ACTIVE)
@@ -31,7 +31,7 @@ def test_a_craft_that_waits_at_a_record_has_reached_it() -> None:
     assert [progress.take(each) for each in (status(2, NavAction.POSHOLD_TIME), holds, holds)] == [(), (2,), ()]
 
 
-def test_the_return_home_at_the_end_completes_the_mission_and_another_one_ends_it() -> None:
+def test_the_return_home_at_the_end_completes_the_mission_and_another_ends_it() -> None:
     progress = MissionProgress()
     progress.take(status(3, NavAction.RTH))
     home = status(3, NavAction.RTH, mode=NavMode.RTH, state=NavState.HOVER_ABOVE_HOME)
@@ -48,5 +48,5 @@ def test_a_finished_mission_is_complete() -> None:
     assert progress.progress is Progress.COMPLETE
 
 
-def test_an_empty_mission_has_no_last_item() -> None:
+def test_an_empty_mission_does_not_have_a_last_item() -> None:
     assert FlownMission().counted(()) == (0, 0)

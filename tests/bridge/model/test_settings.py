@@ -36,7 +36,7 @@ NAME = BoardSetting("name", ValueKind.TEXT, 0, 16, "INAV")
         (NAME, 5, False),
     ],
 )  # fmt: skip
-def test_only_values_of_its_kind_and_range_are_accepted(setting: BoardSetting, value: Value, is_accepted: bool) -> None:
+def test_only_values_of_the_kind_and_range_are_accepted(setting: BoardSetting, value: Value, is_accepted: bool) -> None:
     assert setting.accepts(value) is is_accepted
 
 

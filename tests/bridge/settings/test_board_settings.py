@@ -51,7 +51,7 @@ def test_a_value_out_of_range_is_refused_with_the_range_and_without_a_request(na
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_armed_nothing_is_changed_or_saved(name: str) -> None:
+def test_armed_it_does_not_change_or_save_anything(name: str) -> None:
     board = BOARDS[name]
     faults = Faults()
     world, client = ready(board, faults)
@@ -84,7 +84,7 @@ def test_a_board_that_armed_unnoticed_is_asked_right_before_the_change(name: str
 
 
 @pytest.mark.parametrize("kind", [None, "inav"])
-def test_telemetry_keeps_four_fifths_of_its_rate_while_the_list_is_read(kind: str | None) -> None:
+def test_telemetry_keeps_four_fifths_of_the_rate_while_the_list_is_read(kind: str | None) -> None:
     """At the rates that Mission Planner asks for."""
     world = World(speeds=(115200,), peer=None if kind is None else make_board(kind))
     world.wait_until(lambda world: world.is_found, 40)
@@ -135,7 +135,7 @@ def test_nothing_that_could_arm_or_spin_or_crash_is_set(board: str, name: str, v
 
 
 @pytest.mark.parametrize("name", ["patched Harakiri", "INAV", "MultiWii"])
-def test_a_change_through_the_bridge_raises_no_alarm(name: str) -> None:
+def test_a_change_through_the_bridge_does_not_raise_an_alarm(name: str) -> None:
     board = BOARDS[name]
     world, client = ready(board)
     world.wait_until(lambda world: inside(world.bridge).board_settings.known.state is not None, 60)
@@ -156,7 +156,7 @@ def test_a_change_on_the_board_itself_is_found_by_the_seal_and_read() -> None:
     assert client.value("ROLL_P") == 77
 
 
-def test_while_a_mission_arrives_nothing_is_changed() -> None:
+def test_while_a_mission_arrives_it_does_not_change_anything() -> None:
     world, client = ready(BOARDS["patched Harakiri"])
     station = GroundStation(world)
     station.send(messages.MAVLink_mission_count_message(1, 1, 5, 0))

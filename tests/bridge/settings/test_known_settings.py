@@ -257,14 +257,14 @@ def test_a_first_reading_that_is_cut_off_does_not_forget_a_change_through_the_br
     assert world.events("settings.changed_on_board") == []
 
 
-def test_another_board_is_no_change() -> None:
+def test_another_board_is_not_a_change() -> None:
     memory = MemoryOfThisRun()
     for make in (naze, inav, multiwii, naze):
         world, _ = sealed(make, memory)
         assert world.events("settings.changed_on_board") == []
 
 
-def test_an_armed_board_is_not_asked_and_its_changes_are_reported_after_the_flight() -> None:
+def test_an_armed_board_is_not_asked_and_the_changes_are_reported_after_the_flight() -> None:
     world, _ = sealed(naze)
     world.naze.faults.armed = True
     world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
@@ -303,7 +303,7 @@ def test_a_few_requests_a_minute() -> None:
         assert 0 < len(asked) <= 5 * 3
 
 
-def test_a_board_without_the_commands_is_left_alone() -> None:
+def test_a_board_without_the_commands_is_not_touched() -> None:
     """They are asked twice as settings, and twice for the seal."""
     firmware = partial(TelemetryFirmware, replace(BETAFLIGHT, settings={}))
     world = World(speeds=(115200,), peer=MspBoard(firmware, memoryview(bytearray(1))))
@@ -315,7 +315,7 @@ def test_a_board_without_the_commands_is_left_alone() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_line_that_damages_frames_causes_no_report(seed: int) -> None:
+def test_a_line_that_damages_frames_does_not_cause_a_report(seed: int) -> None:
     world = World(speeds=(115200,), seed=seed)
     world.wait_ready(40)
     world.faults.bit_error_rate = 1e-3

@@ -105,7 +105,7 @@ def test_a_value_that_only_the_board_refuses_is_left_out() -> None:
 
 @pytest.mark.parametrize("name", CHANGES)
 @pytest.mark.parametrize("fault", ["arms", "cable"])
-def test_a_fault_in_the_middle_saves_nothing_and_says_what_was_changed(name: str, fault: str) -> None:
+def test_a_fault_in_the_middle_does_not_save_anything_and_says_what_was_changed(name: str, fault: str) -> None:
     faults = Faults()
     world, client = ready(BOARDS[name], faults)
     before = values(client.wait_read())
@@ -212,7 +212,7 @@ def test_the_plan_from_memory_asks_the_board_nothing() -> None:
     assert len(world.written) == before
 
 
-def test_without_a_board_nothing_is_planned() -> None:
+def test_without_a_board_it_does_not_plan_anything() -> None:
     world = World(powered=False)
     found: list[object] = []
     world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)

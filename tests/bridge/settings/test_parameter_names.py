@@ -60,7 +60,7 @@ def test_long_names_stay_readable() -> None:
     assert parameter["failsafe_procedure"] == "FS_PROC"
 
 
-def test_the_longest_names_of_inav_need_no_checksum() -> None:
+def test_the_longest_names_of_inav_do_not_need_a_checksum() -> None:
     names = parameter_names(LONG.split())
     assert len(names) == len(LONG.split())
     assert not [name for name in names if "~" in name or len(name) > 16]
@@ -81,5 +81,5 @@ def test_a_name_depends_on_no_other_setting_of_another_name() -> None:
     assert sum(alone[name] != together[name] for name in INAV) == 0
 
 
-def test_the_bridges_own_names_are_left_alone() -> None:
+def test_the_bridges_own_names_are_not_touched() -> None:
     assert "SYSID_THISMAV" not in parameter_names(["SYSID_THISMAV", "p_roll"], taken={"SYSID_THISMAV"})

@@ -95,7 +95,7 @@ def test_a_parameter_is_read_by_index_or_by_name(
 
 @pytest.mark.parametrize("board", ["harakiri", "inav", "multiwii"])
 @pytest.mark.parametrize("is_armed", [False, True])
-def test_qgroundcontrol_shows_no_dialog_and_stays_on_the_map(board: str, is_armed: bool) -> None:
+def test_qgroundcontrol_does_not_show_a_dialog_and_stays_on_the_map(board: str, is_armed: bool) -> None:
     """It checks receiver, compass and accelerometer as soon as it has read the parameters."""
     faults = Faults(armed=is_armed, boxes=0)
     world = World(faults=faults, peer=None if board == "harakiri" else make_board(board, faults=faults))
@@ -125,7 +125,7 @@ def test_qgroundcontrol_is_ready_before_a_flight_controller_is_found() -> None:
 
 
 @pytest.mark.parametrize(("blocker", "name"), [(13, "INS_ACCOFFS_X"), (12, "COMPASS_OFS_X")])
-def test_a_sensor_that_inav_reports_as_not_calibrated_has_no_offset(blocker: int, name: str) -> None:
+def test_a_sensor_that_inav_reports_as_not_calibrated_does_not_have_an_offset(blocker: int, name: str) -> None:
     faults = Faults(boxes=0)
     world = World(faults=faults, peer=make_board("inav", faults=faults))
     world.wait_ready()
@@ -184,7 +184,7 @@ def test_every_radius_in_range_is_set(value: float) -> None:
     world.assert_line_was_clean()
 
 
-def test_a_parameter_that_cannot_be_set_is_answered_with_its_value() -> None:
+def test_a_parameter_that_cannot_be_set_is_answered_with_the_value() -> None:
     world, station = radius_world()
     for name, present in ((b"SYSID_THISMAV", 1.0), (b"RC3_MIN", 1000.0), (b"COMPASS_USE2", 0.0)):
         assert values(answers((world, station), param_set(name, 7.0)))[0][:2] == (name.decode(), present)
@@ -357,7 +357,7 @@ def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [(b"P_ROLL", 201.0), (b"NO_SUCH_NAME", 1.0), (b"SYSID_THISMAV", 7.0)])
-def test_a_save_after_a_refused_change_writes_and_says_nothing(name: bytes, value: float) -> None:
+def test_a_save_after_a_refused_change_writes_and_does_not_say_anything(name: bytes, value: float) -> None:
     """Mission Planner asks for it by itself, 10 s after any PARAM_SET."""
     world, station = settled_world()
     operations = world.naze.flash_operations
@@ -437,7 +437,7 @@ def test_lists_of_many_stations_are_sent_side_by_side_at_a_bounded_rate() -> Non
     assert total <= 500 * (world.now - began) + 50
 
 
-def test_a_station_that_leaves_takes_its_list_along() -> None:
+def test_a_station_that_leaves_takes_the_list_along() -> None:
     world, station = settled_world()
     station.send(m.MAVLink_param_request_list_message(1, 1))
     world.run(0.05)

@@ -63,7 +63,7 @@ def test_a_lost_request_is_repeated() -> None:
     assert program.wait_for(SAFEHOME, b"\0").payload == b"\0home"
 
 
-def test_a_reply_with_the_text_of_its_request_is_not_an_echo() -> None:
+def test_a_reply_with_the_text_of_the_request_is_not_an_echo() -> None:
     """SETTING_INFO's reply ends in the name that was asked for, and the port may read it in two parts."""
     board = FakeInav(drop=lambda frame: "request" if frame.command == SETTING_INFO else "")
     world, program = ready(board)
@@ -147,7 +147,7 @@ def test_forged_addresses_do_not_flood_the_stations_with_texts() -> None:
     assert 1 <= sum("198.51.100." in text for text in station.texts()) <= 10
 
 
-def test_over_udp_a_refused_change_gets_no_reply_and_the_rest_is_answered() -> None:
+def test_over_udp_a_refused_change_does_not_get_a_reply_and_the_rest_is_answered() -> None:
     board = FakeInav()
     board.answers = {**board.answers, SAFEHOME: b"\0home"}
     _world, program = ready(board, over_udp=True)
@@ -227,7 +227,7 @@ def test_a_record_that_does_not_crash_an_inav_is_written() -> None:
     ("kind", "poison", "setters", "settings"),
     [("multiwii", b"\xff" * 58, (SET_PID, SET_BOX), (PID, BOX)), ("inav", b"\0", (SET_NAME,), (NAME,))],
 )
-def test_an_empty_setter_is_no_read(
+def test_an_empty_setter_is_not_a_read(
     kind: str, poison: bytes, setters: tuple[int, ...], settings: tuple[int, ...]
 ) -> None:
     """MultiWii executes it with what the request before it left in the receive buffer; INAV erases its name."""
@@ -244,7 +244,7 @@ def test_an_empty_setter_is_no_read(
     assert not world.naze.armed
 
 
-def test_a_waypoint_that_a_multiwii_would_keep_in_ram_is_no_read() -> None:
+def test_a_waypoint_that_a_multiwii_would_keep_in_ram_is_not_a_read() -> None:
     """The one read last decides whether a return home lands (Protocol.cpp, recallWP)."""
     world = World(speeds=(115200,), peer=make_board("multiwii"))
     world.wait_ready(20)

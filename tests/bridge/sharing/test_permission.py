@@ -121,7 +121,7 @@ def test_a_refused_poll_is_answered_with_the_boards_error() -> None:
 
 
 @pytest.mark.parametrize("is_armed", [False, True])
-def test_a_refused_write_is_no_warning(is_armed: bool) -> None:
+def test_a_refused_write_is_not_a_warning(is_armed: bool) -> None:
     """A warning would cover what concerns the craft on Mission Planner's HUD."""
     world = ready("harakiri")
     if is_armed:

@@ -81,7 +81,7 @@ def test_a_flooder_harms_only_itself(kind: str, baud: int) -> None:
         world.assert_line_was_clean()
 
 
-def test_a_flooder_leaves_another_program_of_its_host_its_share() -> None:
+def test_a_flooder_leaves_another_program_of_the_host_the_share() -> None:
     world, _ = flying_station("harakiri")
     ShareProgram(world, "192.0.2.66:1").ask_every(0.0025, (IDENT, b""))
     honest = ShareProgram(world, "192.0.2.66:2")
@@ -180,7 +180,7 @@ def greet(program: ShareProgram, commands: Sequence[int]) -> None:
 
 
 @pytest.mark.parametrize(("kind", "baud"), [("inav", 19200), ("harakiri", 19200)])
-def test_requests_during_a_transfer_wait_for_its_end(kind: str, baud: int) -> None:
+def test_requests_during_a_transfer_wait_for_the_end(kind: str, baud: int) -> None:
     world, _ = flying_station(kind, baud)
     polled = (ATTITUDE, IDENT, BOXNAMES) if kind == "harakiri" else (ATTITUDE, FC_VARIANT, BOXIDS)
     others = (PID, MISC) if kind == "harakiri" else (API_VERSION, BUILD_INFO, NAME, BOARD_INFO, UID)

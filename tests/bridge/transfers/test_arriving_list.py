@@ -14,7 +14,7 @@ from tests.support.upload_bench import A, acks, holding, receiving, requested, s
 from tests.support.world import GroundStation, Radio, World
 
 
-def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
+def test_two_lists_are_never_mixed_if_a_burst_loses_the_first_item() -> None:
     """Mission Planner's "Write Fast" again, with another list of the same length."""
     world, station = holding()
     before, after = waypoints(12, 1), waypoints(12, 2)
@@ -33,7 +33,7 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_its_first_item() -> None:
 
 @pytest.mark.parametrize("answered", [8, 18])
 @pytest.mark.parametrize("repeat", [0.0, 1.0])
-def test_two_lists_are_never_mixed_if_a_request_is_on_its_way(repeat: float, answered: int) -> None:
+def test_two_lists_are_never_mixed_if_a_request_is_on_the_way(repeat: float, answered: int) -> None:
     """MAVProxy answers the request for an item of the old list with one of the new list, which has the same home."""
     world, station = holding()
     station.radio = Radio(repeat=repeat, delay_s=0.05)
@@ -61,7 +61,7 @@ def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) ->
     assert world.stored == records_of(items)
 
 
-def test_two_lists_are_never_mixed_if_a_request_and_its_repeat_are_on_their_way() -> None:
+def test_two_lists_are_never_mixed_if_a_request_and_the_repeat_are_on_their_way() -> None:
     """MAVProxy answers both with its new list's last item."""
     world, station = holding()
     former, items = waypoints(5, 1), [*waypoints(1, 1), *waypoints(5, 2)[1:]]

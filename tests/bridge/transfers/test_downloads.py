@@ -211,7 +211,7 @@ def test_a_download_is_a_snapshot_unaffected_by_an_upload() -> None:
 
 
 @pytest.mark.parametrize("ends", ["ack", "time", "new flight controller", "own upload"])
-def test_a_snapshot_ends_with_its_download(ends: str) -> None:
+def test_a_snapshot_ends_with_the_download(ends: str) -> None:
     """Mission Planner asks for item 0 on arming, long after it read a list that has been replaced since."""
     world, station = holding()
     writer = GroundStation(world, "writer", sysid=250)

@@ -39,7 +39,7 @@ def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool)
     assert "changed: 6 records" in bench.text()
 
 
-def test_another_clients_list_is_noticed_and_its_progress_is_correct() -> None:
+def test_another_clients_list_is_noticed_and_the_progress_is_correct() -> None:
     bench = Bench(9)
     assert Upload(bench.station, plan(21, 7)).run() is ACCEPTED
     bench.eeprom[: 4 * WAYPOINT_SIZE] = b"".join(
@@ -180,7 +180,7 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
     assert not [text for text in station.texts() if "changed" in text]
 
 
-def test_polling_an_empty_multiwii_reports_nothing() -> None:
+def test_polling_an_empty_multiwii_does_not_report_anything() -> None:
     _, world, station = board_with("multiwii")
     before = len(world.written)
     world.run(5)

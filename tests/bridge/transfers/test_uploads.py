@@ -143,7 +143,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     assert world.naze.counters.flash_writes == 2
 
 
-def test_nothing_is_cleared_while_armed() -> None:
+def test_does_not_clear_anything_while_armed() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
@@ -176,7 +176,7 @@ def test_one_item_of_zeros_clears() -> None:
 
 
 @pytest.mark.parametrize("capacity", [146, 30])
-def test_more_than_the_flight_controller_holds_is_no_space(capacity: int) -> None:
+def test_more_than_the_flight_controller_holds_is_refused_with_no_space(capacity: int) -> None:
     options = SimOptions(capacity=capacity)
     world = World(options, flash=flash_holding(OLD_RECORDS, options))
     world.wait_ready()
@@ -262,7 +262,7 @@ def test_the_upload_of_a_station_that_disconnects_ends_at_once() -> None:
     assert world.stored == OLD_RECORDS
 
 
-def test_a_list_announced_again_before_its_write_is_received_again() -> None:
+def test_a_list_announced_again_before_the_write_is_received_again() -> None:
     """The new one may differ: the ack of the previous list would seem to be its own."""
     world, station = holding()
     receiving(world, station, waypoints(8), 7)
@@ -450,7 +450,7 @@ def test_a_list_takes_the_place_of_a_waiting_clear() -> None:
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
-def test_a_list_gets_no_ack_once_its_station_has_announced_another(announce: Message) -> None:
+def test_a_list_does_not_get_an_ack_once_the_station_has_announced_another(announce: Message) -> None:
     world, station = holding()
     receiving(world, station, waypoints(146, 1), 146)
     world.run(0.05)
@@ -691,7 +691,7 @@ def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.1, 2.0])
-def test_a_cancel_that_crosses_a_refusal_erases_nothing(late_s: float) -> None:
+def test_a_cancel_that_crosses_a_refusal_does_not_erase_anything(late_s: float) -> None:
     world, station = holding()
     items = waypoints(8)
     items[5] = replace(items[5], command=21)  # LAND must be last
@@ -720,7 +720,7 @@ def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     assert world.stored == ()
 
 
-def test_a_late_cancel_erases_nothing() -> None:
+def test_a_late_cancel_does_not_erase_anything() -> None:
     world, station = holding()
     items = waypoints(30)
     receiving(world, station, items, 30)

@@ -116,7 +116,7 @@ def test_settings_are_neither_loaded_nor_reset(what: float) -> None:
 
 
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
-def test_nothing_is_done_while_armed(command: int, params: tuple[float, ...], action: int) -> None:
+def test_does_not_act_while_armed(command: int, params: tuple[float, ...], action: int) -> None:
     world, station = a_world()
     world.faults.armed = True
     # Even before the bridge has noticed that it is armed.
@@ -128,7 +128,7 @@ def test_nothing_is_done_while_armed(command: int, params: tuple[float, ...], ac
 
 
 @pytest.mark.parametrize("tele_prot", [TelemetryProtocol.MAVLINK, TelemetryProtocol.FRSKY_9600])
-def test_nothing_is_done_unless_the_arming_state_can_be_read(tele_prot: TelemetryProtocol) -> None:
+def test_does_not_act_unless_the_arming_state_can_be_read(tele_prot: TelemetryProtocol) -> None:
     world, station = a_world(SimOptions(tele_prot=tele_prot))
     world.faults.armed = True
     for seconds in (0.02, 0.3, 4.0):

@@ -60,7 +60,7 @@ def test_every_action_is_answered_by_a_text(action: str) -> None:
     assert len(text.text) <= 50
 
 
-def test_a_refused_command_is_no_banner_beside_the_dialog_of_qgroundcontrol() -> None:
+def test_a_refused_command_is_not_a_banner_beside_the_dialog_of_qgroundcontrol() -> None:
     world, station = connected()
     screen = Screens(station).qgc
     station.heartbeat = QGC_HEARTBEAT
@@ -72,7 +72,7 @@ def test_a_refused_command_is_no_banner_beside_the_dialog_of_qgroundcontrol() ->
 
 
 @pytest.mark.parametrize("number", [519, 521, 525, 2504])
-def test_requests_of_the_program_itself_get_no_text(number: int) -> None:
+def test_requests_of_the_program_itself_do_not_get_a_text(number: int) -> None:
     world, station = connected()
     station.send(command(number))
     world.run(0.5)
@@ -107,7 +107,7 @@ def test_messages_without_an_acknowledgement_are_answered_once(message: Message,
     assert station.messages("MISSION_COUNT")
 
 
-def test_channels_that_are_only_released_are_no_joystick() -> None:
+def test_channels_that_are_only_released_are_not_a_joystick() -> None:
     world, station = connected()
     station.send(m.MAVLink_rc_channels_override_message(1, 1, *[0, 65535] * 4))
     world.run(0.5)
@@ -129,7 +129,7 @@ def test_a_plan_with_only_a_fence_does_not_clear_a_mission_without_fences() -> N
 
 
 @pytest.mark.parametrize("kind", ["betaflight", "lost"])
-def test_whoever_reads_a_missing_mission_gets_an_empty_list_and_the_reason(kind: str) -> None:
+def test_reading_a_missing_mission_returns_an_empty_list_and_the_reason(kind: str) -> None:
     """QGroundControl reads at each connection: a refusal would be a dialog each time."""
     world, station = connected("betaflight" if kind == "betaflight" else "naze")
     if kind == "lost":

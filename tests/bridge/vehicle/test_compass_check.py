@@ -68,7 +68,7 @@ def test_a_craft_that_moves_is_not_told_again(armed: bool) -> None:
     assert len([text for text in station.texts() if "Compass" in text]) == 1
 
 
-def test_inav_needs_no_declination_while_it_finds_it_itself() -> None:
+def test_inav_does_not_need_a_declination_while_it_finds_it_itself() -> None:
     world, client = ready(BOARDS["INAV"])
     client.change("mag_declination", 3000)
     assert compass_texts(world, "automatic") == []

@@ -149,7 +149,7 @@ def test_messages_that_change_something_must_be_signed(message: Message, answer:
 
 @pytest.mark.parametrize("message", READS, ids=named)
 @pytest.mark.parametrize("version", [1, 2])
-def test_reading_needs_no_signature(message: Message, version: int) -> None:
+def test_reading_does_not_need_a_signature(message: Message, version: int) -> None:
     world = keyed()
     GroundStation(world, version=version).send(message)
     world.run(0.5)
@@ -235,7 +235,7 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
 
 
 @pytest.mark.parametrize("was_right", [False, True])
-def test_a_station_is_told_that_its_clock_is_wrong(*, was_right: bool) -> None:
+def test_a_station_is_told_that_the_clock_is_wrong(*, was_right: bool) -> None:
     world = keyed()
     station, right = signing_station(world), signing_station(world, "right clock", sysid=254)
     if was_right:
@@ -269,7 +269,7 @@ def test_each_refused_attempt_is_answered_with_a_text() -> None:
         world.run(1)
 
 
-def test_a_refused_request_for_rates_gets_no_text() -> None:
+def test_a_refused_request_for_rates_does_not_get_a_text() -> None:
     """Every ground station sends some when it connects, and every radio its status."""
     world = keyed()
     station = GroundStation(world)
@@ -283,7 +283,7 @@ def test_a_refused_request_for_rates_gets_no_text() -> None:
 
 
 @pytest.mark.parametrize("access", [LinkAccess(signing(), LINK_ID), LinkAccess(may_write=lambda peer: "pilot" in peer)])
-def test_a_listener_gets_no_texts_for_others(access: LinkAccess) -> None:
+def test_a_listener_does_not_get_texts_for_others(access: LinkAccess) -> None:
     world = World(speeds=(115200,), links={"udp": access})
     world.wait_ready()
     pilot = signing_station(world, "pilot")
@@ -311,7 +311,7 @@ def test_listeners_do_not_displace_a_station_with_the_key() -> None:
     assert len(peers) <= 32
 
 
-def test_an_address_must_show_the_key_again_after_its_station_has_left() -> None:
+def test_an_address_must_show_the_key_again_after_the_station_has_left() -> None:
     world = keyed()
     station, another = signing_station(world), GroundStation(world, sysid=250)
     assert another.peer == station.peer

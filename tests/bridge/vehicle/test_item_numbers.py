@@ -64,7 +64,7 @@ def test_the_sender_counts_as_sent_and_others_as_read() -> None:
     assert (reached(sender), reached(other)) == ([2, 3], [1, 2])
 
 
-def test_reading_the_list_changes_to_its_numbers() -> None:
+def test_reading_the_list_changes_to_the_numbers() -> None:
     world, board = bench()
     sender = GroundStation(world)
     assert Upload(sender, WITH_TAKEOFF).run() is MissionResult.ACCEPTED

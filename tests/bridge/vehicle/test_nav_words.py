@@ -91,7 +91,7 @@ def test_the_numbers_are_those_of_each_stations_plan() -> None:
     assert words_of(other) == ["TO WP 1/3", "TO WP 2/3"]
 
 
-def test_a_newcomer_gets_no_old_words_and_the_ground_has_none() -> None:
+def test_a_newcomer_does_not_get_old_words_and_the_ground_has_none() -> None:
     world, board = bench()
     station = GroundStation(world)
     assert Upload(station, [HOME, *LEGS[:2], RTL]).run() is MissionResult.ACCEPTED

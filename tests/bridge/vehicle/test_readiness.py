@@ -107,7 +107,7 @@ def test_every_client_is_told_the_same(name: str) -> None:
     assert (expected.prearm or "").removeprefix("PreArm: ") == ", ".join(why) or name == "unknown"
 
 
-def test_a_write_is_no_reason_not_to_arm() -> None:
+def test_a_write_is_not_a_reason_not_to_arm() -> None:
     world = naze()
     station = GroundStation(world)
     screens = Screens(station)
@@ -122,7 +122,7 @@ def test_a_write_is_no_reason_not_to_arm() -> None:
     assert not any(text.startswith("PreArm") for text in station.texts())
 
 
-def test_the_end_of_all_reasons_is_no_failure_to_qgroundcontrol() -> None:
+def test_the_end_of_all_reasons_is_not_a_failure_to_qgroundcontrol() -> None:
     """Which takes each text that begins with PreArm for one."""
     world = blocked()
     station = GroundStation(world)

@@ -239,7 +239,7 @@ def test_only_one_request_runs_at_a_time_and_a_repeated_one_is_not_sent_again() 
     assert "Set WP: another request is running, try again" in flight.station.texts()
 
 
-def test_a_client_that_repeats_its_request_at_each_other_item_gets_none() -> None:
+def test_a_client_that_repeats_the_request_at_each_other_item_gets_none() -> None:
     """MAVSDK, which requests no streams."""
     flight = Flight().begin()
     flight.world.run_until(lambda _: bool(flight.current()), 2)
@@ -263,7 +263,7 @@ def test_the_item_has_the_number_of_the_list_that_the_station_sent() -> None:
     assert "Set WP: item 4 (DO_JUMP) is not flown to" in reader.texts()
 
 
-def test_a_station_on_an_open_link_may_write_but_sets_no_waypoint() -> None:
+def test_a_station_on_an_open_link_may_write_but_does_not_set_a_waypoint() -> None:
     flight = Flight(links={})
     assert Upload(flight.station, MISSION).run() is MissionResult.ACCEPTED
     flight.begin()
@@ -273,7 +273,7 @@ def test_a_station_on_an_open_link_may_write_but_sets_no_waypoint() -> None:
     assert "Set WP: open link; see pass_through in settings" in flight.station.texts()
 
 
-def test_a_station_that_may_only_read_sets_no_waypoint() -> None:
+def test_a_station_that_may_only_read_does_not_set_a_waypoint() -> None:
     def may_write(peer: Peer) -> bool:
         return peer.key == "pilot"
 
@@ -288,7 +288,7 @@ def test_a_station_that_may_only_read_sets_no_waypoint() -> None:
     assert flight.number == 3
 
 
-def test_without_a_known_mission_nothing_is_sent() -> None:
+def test_without_a_known_mission_it_does_not_send_anything() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.WP else "")
     inav.records, inav.is_valid, inav.armed = [FAKE], True, True
     world = World(speeds=(115200,), peer=inav, links=LINKS)

@@ -16,7 +16,7 @@ ROUND_TRIPS = {104: 28, 101: 23, 102: 30, 105: 28, 106: 26, 108: 20, 109: 18, 11
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_telemetry_takes_only_its_share_of_the_line(baud: int) -> None:
+def test_telemetry_takes_only_a_share_of_the_line(baud: int) -> None:
     world, station = flown(2, baud=baud)
     for row in TELEMETRY:
         station.send(m.MAVLink_command_long_message(1, 1, 511, 0, row.msgid, 10_000, 0, 0, 0, 0, 0))

@@ -108,7 +108,7 @@ def test_every_message_can_be_packed_whatever_a_board_replies(profile: Profile, 
             assert pack(message).payload_v2
 
 
-def test_a_current_sensor_below_zero_is_no_huge_consumption() -> None:
+def test_a_current_sensor_below_zero_is_not_a_huge_consumption() -> None:
     """INAV's current and consumption are signed: a wrong offset makes both negative."""
     analog = struct.pack("<BHhiiiIBH", 3 << 4, 1200, -40, -480, -7, -80, 0, 90, 800)
     (message,) = at(with_replies(Vehicle(), INAV, INAV_ANALOG=analog)).made(make.battery_status)
@@ -128,12 +128,12 @@ def test_without_a_fix_there_is_no_position() -> None:
     assert math.isnan(hud["alt"])
 
 
-def test_harakiri_sends_no_course_and_no_dilution() -> None:
+def test_harakiri_does_not_send_a_course_or_dilution() -> None:
     raw = fields(make.gps_raw_int(at(with_replies(Vehicle(), HARAKIRI, RAW_GPS=gps()), 5)))
     assert (raw["cog"], raw["eph"], raw["epv"], raw["time_usec"]) == (U16, U16, U16, 5000)
 
 
-def test_a_first_fix_in_motion_has_no_direction_yet() -> None:
+def test_a_first_fix_in_motion_does_not_have_a_direction_yet() -> None:
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
     assert at(state).made(make.global_position_int) == []
     with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))  # a metre to the north
@@ -165,7 +165,7 @@ def test_the_height_is_shown_without_a_fix() -> None:
 
 
 @pytest.mark.parametrize("height_m", [-30, 30])
-def test_a_craft_far_above_or_below_its_home_is_in_the_air(height_m: int) -> None:
+def test_a_craft_far_above_or_below_the_home_is_in_the_air(height_m: int) -> None:
     altitude = struct.pack("<ih", height_m * 100, 0)
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=altitude, RAW_GPS=gps(speed=0))
     assert state.armed
@@ -370,7 +370,7 @@ def test_home_in_flight_is_lower_than_the_craft() -> None:
     assert all(math.isnan(value) for value in (*home.q, home.approach_x))
 
 
-def test_inavs_home_has_its_altitude_in_centimetres() -> None:
+def test_inavs_home_has_the_altitude_in_centimetres() -> None:
     home = struct.pack("<BBiiihhhB", 0, 4, 453830000, 84730000, 13147, 0, 0, 0, 0xA5)
     mission_record = struct.pack("<BBiiihhhB", 1, 1, 453838000, 84733000, 2000, 0, 0, 0, 0xA5)
     height = struct.pack("<ihi", 1012, 0, 0)
@@ -383,7 +383,7 @@ def test_inavs_home_has_its_altitude_in_centimetres() -> None:
     assert make.global_position_int(at(state)).alt == 141_590
 
 
-def test_an_inav_without_a_voltage_reports_no_battery() -> None:
+def test_an_inav_without_a_voltage_does_not_report_a_battery() -> None:
     analog = struct.pack("<BHHIIIIBH", 3 << 4, 0, 0, 0, 0, 0, 0, 0, 0)
     assert at(with_replies(Vehicle(), INAV, INAV_ANALOG=analog)).made(make.battery_status) == []
 

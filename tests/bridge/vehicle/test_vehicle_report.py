@@ -69,7 +69,7 @@ def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
     assert bridge.report(world.now).mission is None
 
 
-def test_after_a_lost_link_only_what_matters_is_kept_with_its_age() -> None:
+def test_after_a_lost_link_only_what_matters_is_kept_with_the_age() -> None:
     world = World()
     world.wait_ready()
     world.run(3.0)
@@ -108,7 +108,7 @@ def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     assert world.take_published() == set()
 
 
-def test_the_age_of_a_value_grows_while_the_bridge_hears_nothing_and_has_nothing_to_do() -> None:
+def test_the_age_of_a_value_grows_while_the_bridge_does_not_hear_anything() -> None:
     world, autopilot, _ = passing()
     world.bridge.watch(Group)
     autopilot.send(m.MAVLink_attitude_message(1, 0.25, 0, 0, 0, 0, 0))

@@ -67,7 +67,7 @@ def test_the_longest_values_are_those_of_the_text(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", Kind)
-def test_a_long_text_is_whole_again_when_its_pieces_are_joined(kind: Kind) -> None:
+def test_a_long_text_is_whole_again_when_the_pieces_are_joined(kind: Kind) -> None:
     text = "19 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME) and so on"
     joined = "".join(pieces(text, kind))
     assert joined.split() == text.split()
@@ -89,7 +89,7 @@ def test_reasons_not_to_arm_share_lines() -> None:
     assert prearm_lines(()) == []
 
 
-def test_a_setting_name_is_shortened_in_its_middle() -> None:
+def test_a_setting_name_is_shortened_in_the_middle() -> None:
     line = TABLE["REFUSED_BY_BOARD"]("osd_mah_remaining_precision_and_more", "-1.234567e+30").line
     assert line == "osd_mah_rem..n_and_more stays -1.234567e+30: refused"[: len(line)] or len(line) <= 50
     assert settings_changed(("p_roll",)).line == "Settings changed elsewhere: p_roll"

@@ -26,7 +26,7 @@ ARMED = sentences.ARMED()
         (Behaviour(commands=True, compid=0), Kind.UNKNOWN),
     ],
 )
-def test_a_kind_is_known_by_its_behaviour(behaviour: Behaviour, kind: Kind) -> None:
+def test_a_kind_is_known_by_the_behaviour(behaviour: Behaviour, kind: Kind) -> None:
     assert behaviour.kind is kind
 
 
@@ -64,7 +64,7 @@ def test_what_sys_status_replaces_on_the_hud_is_repeated() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kind.MAVPROXY, Kind.UNKNOWN])
-def test_a_station_that_answers_no_question_gets_bad_news_three_times(kind: Kind) -> None:
+def test_a_station_that_does_not_answer_a_question_gets_bad_news_three_times(kind: Kind) -> None:
     assert heard(kind, MISSING) == 3
     assert heard(kind, ARMED) == 1
 

@@ -98,7 +98,7 @@ def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes)
         decode(frame)
 
 
-def test_a_signed_frame_includes_its_signature() -> None:
+def test_a_signed_frame_includes_the_signature() -> None:
     codec = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     codec.signing.secret_key = bytes(32)
     codec.signing.sign_outgoing = True

@@ -126,7 +126,7 @@ FRAME = telemetry("MAVLink 2", 2, 0)[1]
         bytes((0xFE, 255, 1, 1, 1, 3)),
     ],
 )
-def test_an_impossible_header_delays_nothing(header: bytes) -> None:
+def test_an_impossible_header_does_not_delay_anything(header: bytes) -> None:
     assert [frame.raw for frame in MavlinkSplitter().feed(header + FRAME)] == [FRAME]
 
 
@@ -151,7 +151,7 @@ def test_silence_releases_a_frame_hidden_by_a_truncated_one() -> None:
     assert splitter.feed(b"", is_end=True) == []
 
 
-def test_a_signature_with_missing_bytes_loses_no_later_frame() -> None:
+def test_a_signature_with_missing_bytes_does_not_lose_a_later_frame() -> None:
     """The loss cannot be detected without the key."""
     before, cut, after = telemetry(SIGNED, 3, 4)
     for missing in range(1, SIGNATURE_SIZE + 1):
@@ -179,7 +179,7 @@ def mavlink_1_frame(msgid: int, payload: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(("size", "is_one"), [(36, False), (37, True), (38, True), (39, False)])
-def test_a_mavlink_1_payload_must_have_its_messages_size(size: int, is_one: bool) -> None:
+def test_a_mavlink_1_payload_must_have_the_messages_size(size: int, is_one: bool) -> None:
     """MISSION_ITEM has 37 bytes, or 38 with the extension, which pymavlink also packs into MAVLink 1."""
     assert bool(MavlinkSplitter().feed(mavlink_1_frame(39, bytes(size)))) == is_one
 

@@ -42,23 +42,23 @@ def test_no_other_message_is_one(msgid: int) -> None:
 
 
 @pytest.mark.parametrize("payload", [b"", GOOD[:8], GOOD + b"\0", GOOD[:4]], ids=len)
-def test_its_length_must_be_right(payload: bytes) -> None:
+def test_the_length_must_be_right(payload: bytes) -> None:
     assert not is_plausible_heartbeat(frame(payload))
 
 
 @pytest.mark.parametrize(("at", "highest"), [(4, 45), (5, 20), (7, 8)], ids=["type", "autopilot", "state"])
-def test_its_fields_must_be_known(at: int, highest: int) -> None:
+def test_the_fields_must_be_known(at: int, highest: int) -> None:
     assert is_plausible_heartbeat(frame(with_byte(at, highest)))
     assert not is_plausible_heartbeat(frame(with_byte(at, highest + 1)))
 
 
-def test_its_version_is_3_and_its_system_is_not_0() -> None:
+def test_the_version_is_3_and_the_system_is_not_0() -> None:
     assert not is_plausible_heartbeat(frame(with_byte(8, 2)))
     assert not is_plausible_heartbeat(frame(with_byte(8, 4)))
     assert not is_plausible_heartbeat(frame(GOOD, sysid=0))
 
 
-def test_a_camera_is_no_autopilot() -> None:
+def test_a_camera_is_not_an_autopilot() -> None:
     assert is_autopilot_heartbeat(frame(GOOD))
     assert not is_autopilot_heartbeat(frame(with_byte(5, m.MAV_AUTOPILOT_INVALID)))
     assert not is_autopilot_heartbeat(frame(GOOD, m.MAVLINK_MSG_ID_SYS_STATUS))

@@ -101,7 +101,7 @@ def test_unsigned_frames_of_both_versions_are_recognised() -> None:
         assert our_side().check(MavlinkFrame(bytes(HEARTBEAT.pack(side, force_mavlink1=mavlink_1)))) is Check.UNSIGNED
 
 
-def test_a_frame_with_another_key_is_refused_and_changes_no_state() -> None:
+def test_a_frame_with_another_key_is_refused_and_does_not_change_a_state() -> None:
     signing = our_side()
     far_ahead = ticks(NOON) + TOLERANCE
     assert signing.check(frame_of(pymavlink_side(sha256(b"").digest(), far_ahead))) is Check.WRONG
@@ -238,7 +238,7 @@ def test_frames_received_in_an_earlier_run_are_replays() -> None:
     assert much_after.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 1))) is Check.LATE
 
 
-def test_the_largest_timestamp_raises_nothing() -> None:
+def test_the_largest_timestamp_does_not_raise_anything() -> None:
     signing = our_side()
     peer = SignedPeer(signing, 0, "gcs")
     assert peer.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.EARLY

@@ -18,7 +18,7 @@ def test_anything_in_a_file_is_quoted_printable_and_on_one_line(found: object) -
     assert shown(found).isprintable()
 
 
-def test_a_file_of_another_kind_of_plan_is_refused_by_its_name() -> None:
+def test_a_file_of_another_kind_of_plan_is_refused_by_the_name() -> None:
     refuse_other_plans([5001, 16], "x.plan")
     with pytest.raises(MissionFileError, match=r"x\.plan.*a fence and rally points"):
         refuse_other_plans([5001, 5100], "x.plan")

@@ -125,7 +125,7 @@ def test_a_survey_becomes_the_items_that_fly_it() -> None:
     assert [item.seq for item in items] == list(range(6))
 
 
-def test_a_plan_is_recognised_by_its_contents() -> None:
+def test_a_plan_is_recognised_by_the_contents() -> None:
     assert len(read_mission_file(b"\xef\xbb\xbf\n " + json.dumps(plan(simple())).encode(), "mission.txt")) == 2
 
 
@@ -180,7 +180,7 @@ def test_a_plan_that_is_not_json_is_refused(data: bytes) -> None:
         read_mission_file(data, "field.plan")
 
 
-def test_a_truncated_plan_is_refused_with_its_line() -> None:
+def test_a_truncated_plan_is_refused_with_the_line() -> None:
     whole = json.dumps(plan(simple(), simple()), indent=1).encode()
     for length in range(1, len(whole)):
         with pytest.raises(MissionFileError, match=r"line \d+: not valid JSON"):

@@ -94,12 +94,12 @@ def test_a_file_without_home_gets_one_without_a_position() -> None:
     assert same(items[1:], ITEMS[1:])
 
 
-def test_a_last_line_without_its_end_and_autocontinue_is_truncated() -> None:
+def test_a_last_line_without_the_end_and_autocontinue_is_truncated() -> None:
     with pytest.raises(MissionFileError, match="11 fields"):
         read_mission_file("\n".join([HEADER, HOME, POINT.removesuffix("\t1")]).encode(), "x")
 
 
-def test_the_last_line_needs_no_newline() -> None:
+def test_the_last_line_does_not_need_a_newline() -> None:
     assert same(read_mission_file("\n".join([HEADER, HOME, POINT]).encode(), "x"), ITEMS)
 
 
@@ -151,7 +151,7 @@ def test_degrees_are_rounded_to_1e_7(degrees: str, e7: int | None) -> None:
         (["RALLY\t45.383\t8.473\t100\t0\t0\t0"], ["holds rally points"]),
     ],
 )
-def test_a_damaged_file_is_refused_with_its_line(lines: list[str], words: list[str]) -> None:
+def test_a_damaged_file_is_refused_with_the_line(lines: list[str], words: list[str]) -> None:
     text = error(*lines)
     assert text.startswith("field.waypoints")
     for word in words:

@@ -42,7 +42,7 @@ def test_two_requests_echoed_are_a_command_line_and_one_is_not() -> None:
     assert watch.is_echo()
 
 
-def test_another_boards_reply_is_no_echo() -> None:
+def test_another_boards_reply_is_not_an_echo() -> None:
     watch = EchoWatch()
     watch.sent.extend((IDENT, IDENT, IDENT))
     watch.feed(b"$M>\x07d\xf0\x03\0\0\0\0\0\x94" * 4)

@@ -53,6 +53,6 @@ def test_no_bytes_raise() -> None:
         decode_setting_info(dice.randbytes(dice.randrange(60)))
 
 
-def test_a_setting_is_named_by_its_text_or_behind_a_zero_by_its_index() -> None:
+def test_a_setting_is_named_by_the_text_or_behind_a_zero_by_the_index() -> None:
     assert encode_about_name("name") == b"name\0"
     assert encode_about_index(258) == b"\0\2\1"

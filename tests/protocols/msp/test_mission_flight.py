@@ -59,7 +59,7 @@ def test_no_record_is_none() -> None:
 
 
 @pytest.mark.parametrize("at", [0, 1, 3, 4])
-def test_another_status_version_state_or_reason_is_no_progress(at: int) -> None:
+def test_another_status_version_state_or_reason_does_not_count_as_progress(at: int) -> None:
     assert decode_flight(REPLY[:at] + b"\x63" + REPLY[at + 1 :]) is None
 
 

@@ -25,6 +25,6 @@ def test_a_jump_that_crashes_cannot_even_be_encoded(target: int) -> None:
         encode_set_wp(2, NavRecord(A.JUMP, p1=target))
 
 
-def test_the_waypoint_is_set_by_its_index() -> None:
+def test_the_waypoint_is_set_by_the_index() -> None:
     """INAV counts from 0."""
     assert encode_fly_to(4)[:9] == bytes.fromhex("24583c002122010003")

@@ -33,7 +33,7 @@ RECORDS = st.builds(
 
 @pytest.mark.parametrize("profile", [inav_profile(), multiwii_profile()], ids=lambda profile: profile.name)
 @given(records=st.lists(RECORDS, min_size=1, max_size=4))
-def test_a_list_that_is_written_again_is_the_same_or_its_changes_are_reported(
+def test_a_list_that_is_written_again_is_the_same_or_the_changes_are_reported(
     profile: NavProfile, records: list[NavRecord]
 ) -> None:
     former = (*records[:-1], replace(records[-1], flag=LAST))

@@ -50,14 +50,14 @@ def test_replies_survive_the_wire(status: ReplyStatus, first: int, settings: lis
 
 
 @given(st.binary(max_size=250))
-def test_bad_bytes_are_no_reply_or_a_whole_one(payload: bytes) -> None:
+def test_bad_bytes_are_not_reply_or_a_whole_one(payload: bytes) -> None:
     reply = decode_settings(payload)
     assert reply is None or len(encode_reply(reply)) == len(payload)
     decode_table(payload)
 
 
 @given(held_settings(), st.integers(0, 65535), st.integers(0, 2**32 - 1))
-def test_requests_have_no_hazard_byte(held: HeldSetting, index: int, checksum: int) -> None:
+def test_requests_do_not_have_a_hazard_byte(held: HeldSetting, index: int, checksum: int) -> None:
     assert is_clean(encode_set_setting(index, held.setting, held.value))
     assert is_clean(encode_read_settings(index, index))
     assert is_clean(encode_save(checksum))

@@ -38,7 +38,7 @@ def test_settings_are_named(firmware: Firmware, part: Part, size: int, names: tu
     assert tuple(field.name for field in found) == names
 
 
-def test_the_counters_of_a_multiwii_are_no_settings() -> None:
+def test_the_counters_of_a_multiwii_are_not_settings() -> None:
     misc = next(request for request in SETTINGS[Firmware.MULTIWII] if request.part is Part.MISC)
     counters = range(10, 16)
     assert not [field for field in fields(misc, bytes(22), (), ()) if field.at in counters]

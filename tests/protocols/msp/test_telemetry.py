@@ -37,7 +37,7 @@ def test_any_payload_is_read_or_unknown(payload: bytes) -> None:
         decode(payload)
 
 
-def test_status_has_its_sensors() -> None:
+def test_status_has_the_sensors() -> None:
     status = t.decode_status(LEAST[0][1])
     sensors = t.Sensor.ACCELEROMETER | t.Sensor.BAROMETER | t.Sensor.GPS
     assert status == t.StatusReport(3000, 7, sensors, 0x21)

@@ -40,12 +40,12 @@ def test_a_message_that_would_come_less_than_once_a_second_is_silenced(interval_
 
 
 @pytest.mark.parametrize(("current", "effect"), [(0, Effect.CHANGE), (1, Effect.CHANGE), (2, Effect.MOVE)])
-def test_an_item_that_is_flown_to_at_once_is_no_upload(current: int, effect: Effect) -> None:
+def test_an_item_that_is_flown_to_at_once_is_not_an_upload(current: int, effect: Effect) -> None:
     item = mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 1, 0, 0, 0, 0, 0, 0, 0.0)
     assert effect_of(frame(item)) is effect
 
 
-def test_arming_moves_and_a_request_for_the_list_changes_nothing() -> None:
+def test_arming_moves_and_a_request_for_the_list_does_not_change_anything() -> None:
     arm = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
     assert effect_of(frame(arm)) is Effect.MOVE
     assert effect_of(frame(mavlink.MAVLink_mission_request_list_message(1, 1))) is Effect.DIALOGUE

@@ -117,7 +117,7 @@ def test_every_command_of_the_bridge_is_among_them() -> None:
 
 
 @pytest.mark.parametrize("firmware", Firmware)
-def test_a_frame_within_a_frame_has_no_row(firmware: Firmware) -> None:
+def test_a_frame_within_a_frame_does_not_have_a_row(firmware: Firmware) -> None:
     assert all(msp_right(firmware, 255, bytes(size)).effect is Effect.UNKNOWN for size in range(256))
 
 

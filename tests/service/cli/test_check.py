@@ -171,7 +171,7 @@ def test_the_examples_have_the_intended_results() -> None:
 
 
 @pytest.mark.parametrize(("kind", "stored", "findings"), [("harakiri", 2, 1), ("inav", 3, 0), ("multiwii", 2, 1)])
-def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
+def test_each_kind_of_flight_controller_has_a_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
     home, point = (replace(item, p2=2.0 if kind == "harakiri" else 0.0) for item in (HOME, POINT))
     file = tmp_path / "speed.waypoints"
     file.write_text(write_qgc_wpl([home, SPEED, replace(point, seq=2)]))
@@ -185,7 +185,7 @@ def test_each_kind_of_flight_controller_has_its_rules(tmp_path: Path, kind: str,
     assert run("--kind", kind, *settings, LONG).exit_code == (1 if kind == "inav" else 0)
 
 
-def test_an_inavs_saved_settings_decide_about_its_missions(tmp_path: Path) -> None:
+def test_an_inavs_saved_settings_decide_about_the_missions(tmp_path: Path) -> None:
     home, point = (replace(item, p2=0.0) for item in (HOME, POINT))
     mission, dump = tmp_path / "mission.waypoints", tmp_path / "dump.txt"
     mission.write_text(write_qgc_wpl([home, replace(point, alt_m=30.0)]))
@@ -247,14 +247,14 @@ def test_filled_in_defaults_appear_only_in_the_table(tmp_path: Path) -> None:
     assert "WP 1: Alt changed from 10.5 to 10 m" in output
 
 
-def test_an_unreadable_file_is_one_sentence_on_stderr(files: dict[str, Path]) -> None:
+def test_an_unreadable_file_is_reported_in_one_sentence_on_stderr(files: dict[str, Path]) -> None:
     result = run(files["damaged"])
     assert result.stdout == ""
     assert result.stderr.startswith(f"naze-bridge: {files['damaged']}, line 3: ")
     assert result.stderr.count("\n") == 1
 
 
-def test_a_file_without_home_is_checked_as_if_the_craft_were_at_its_first_waypoint(tmp_path: Path) -> None:
+def test_a_file_without_home_is_checked_as_if_the_craft_were_at_the_first_waypoint(tmp_path: Path) -> None:
     file = tmp_path / "old.txt"
     point = "{}\t0\t3\t16\t0\t0\t0\t0\t51.477{}\t0.0012\t15\t1\n"
     file.write_text("QGC WPL 120\n" + "".join(point.format(seq, seq) for seq in range(3)))

@@ -18,7 +18,7 @@ from tests.support.plan import HOME, PlanRow, plain_plan
 from tests.support.programs import Daemon, run_naze_bridge
 
 
-def test_a_missing_daemon_is_one_sentence(tmp_path: Path) -> None:
+def test_a_missing_daemon_is_reported_in_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--state-dir", tmp_path), 1, str(tmp_path), "naze-bridge run")
 
 

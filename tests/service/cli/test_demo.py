@@ -42,7 +42,7 @@ def demo(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_its_daemon_and_files_are_removed_at_the_end(demo: Program, folder: Path, number: signal.Signals) -> None:
+def test_the_daemon_and_files_are_removed_at_the_end(demo: Program, folder: Path, number: signal.Signals) -> None:
     (state,) = folder.glob(f"{TEMPORARY}*")
     daemon = int((state / "lock").read_text())
     os.kill(daemon, 0)
@@ -69,7 +69,7 @@ def test_an_installation_has_the_example(tmp_path: Path) -> None:
     assert "Sent 14 items; the flight controller holds 13" in ended.stdout
 
 
-def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_in_one_sentence(tmp_path: Path) -> None:
     ended = run_naze_bridge("demo", "--once", tmp_path / "none")
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"naze-bridge: {tmp_path / 'none'}: No such file")

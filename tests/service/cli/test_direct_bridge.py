@@ -53,11 +53,11 @@ def test_status_waits_for_telemetry(tmp_path: Path) -> None:
     assert status["satellites"] > 4
 
 
-def test_a_missing_port_is_one_sentence(tmp_path: Path) -> None:
+def test_a_missing_port_is_reported_in_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
 
 
-def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
+def test_a_port_used_by_another_program_is_reported_in_one_sentence(board: Board) -> None:
     script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
     with subprocess.Popen(
         [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -68,7 +68,7 @@ def test_a_port_used_by_another_program_is_one_sentence(board: Board) -> None:
         other.kill()
 
 
-def test_a_tcp_port_without_a_listener_is_one_sentence() -> None:
+def test_a_tcp_port_without_a_listener_is_reported_in_one_sentence() -> None:
     assert_one_sentence(
         run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"),
         1,
@@ -76,7 +76,7 @@ def test_a_tcp_port_without_a_listener_is_one_sentence() -> None:
     )
 
 
-def test_an_unknown_host_is_one_sentence() -> None:
+def test_an_unknown_host_is_reported_in_one_sentence() -> None:
     advice = "check the name and the network"
     assert_one_sentence(run_naze_bridge("pull", "--fc", "tcp:[fe80::1%no-card]:9"), 1, advice)
 

@@ -27,7 +27,7 @@ def test_a_wrong_file_is_refused_without_a_daemon(
     assert_one_sentence(run_naze_bridge("firmware", "flash", file, "--state-dir", tmp_path), status, why)
 
 
-def test_a_missing_file_and_a_wrong_backup_are_one_sentence(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_wrong_backup_are_reported_in_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("firmware", "flash", tmp_path / "x.hex"), 2, "x.hex")
     part = tmp_path / "x.bin"
     part.write_bytes(stand_in(patched=True))

@@ -33,7 +33,7 @@ def test_an_image_that_does_not_answer_is_refused(image: str) -> None:
     assert "does not answer" in output
 
 
-def test_a_file_that_is_no_image_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_an_image_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.elf"
     path.write_bytes(b"no program")
     code, output = run(FIELD, "--image", str(path))

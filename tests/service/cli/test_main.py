@@ -13,7 +13,7 @@ from tests.support.programs import run_naze_bridge
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
-def test_a_full_disk_behind_standard_output_is_one_sentence(tmp_path: Path) -> None:
+def test_a_full_disk_behind_standard_output_is_reported_in_one_sentence(tmp_path: Path) -> None:
     def leave_100_bytes() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 

@@ -107,7 +107,7 @@ def test_pull_writes_a_file_that_push_accepts(daemon: Daemon, tmp_path: Path) ->
     assert ask(daemon, "push", file).returncode == 0
 
 
-def test_pull_through_a_link_replaces_its_target(daemon: Daemon, tmp_path: Path) -> None:
+def test_pull_through_a_link_replaces_the_target(daemon: Daemon, tmp_path: Path) -> None:
     target, link = tmp_path / "target", tmp_path / "link"
     link.symlink_to(target)
     for _ in ("a new file", "the same again"):
@@ -151,7 +151,7 @@ def test_pull_into_a_missing_folder_is_refused(daemon: Daemon, tmp_path: Path) -
     assert_one_sentence(ask(daemon, "pull", tmp_path / "none" / "held"), 1, "No such file or directory")
 
 
-def test_a_full_disk_is_named_with_its_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_named_with_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "")
 
@@ -183,7 +183,7 @@ def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) ->
     } == {daemon.pull()["checksum"]}
 
 
-def test_tables_fit_and_have_no_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
+def test_tables_fit_and_do_not_have_a_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
     far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
     plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
     file = write_plan(tmp_path / "plan", plan)

@@ -75,7 +75,7 @@ def test_an_ignored_ctrl_c_stays_ignored() -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def test_a_question_without_an_answer_is_one_sentence(tmp_path: Path) -> None:
+def test_a_question_without_an_answer_is_reported_in_one_sentence(tmp_path: Path) -> None:
     ended = run("from service.cli.program import start; start()", "setup", "--root", tmp_path)
     assert ended.returncode == 1
     said = "standard input ended before the question" if os.geteuid() == 0 else "setup needs root"

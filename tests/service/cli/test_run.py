@@ -64,7 +64,7 @@ def test_errors_are_reported_with_the_file(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("path", "words"), [("/dev/zero", "not a regular file"), ("/none", "No such file"), ("/" + 256 * "x", "too long")]
 )
-def test_an_unreadable_file_is_one_sentence(tmp_path: Path, path: str, words: str) -> None:
+def test_an_unreadable_file_is_reported_in_one_sentence(tmp_path: Path, path: str, words: str) -> None:
     ended = run_naze_bridge("run", "--fc", "sim:", "--config", path, "--state-dir", tmp_path)
     assert ended.returncode == 2
     assert ended.stderr.splitlines()[0].startswith(f"naze-bridge: {path}: this cannot be read: ")

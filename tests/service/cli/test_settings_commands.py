@@ -55,7 +55,7 @@ def test_settings_are_listed_changed_and_saved(tuned: Daemon) -> None:
     assert negative.returncode == 0, negative
 
 
-def test_what_cannot_be_set_is_one_sentence(tuned: Daemon) -> None:
+def test_what_cannot_be_set_is_reported_in_one_sentence(tuned: Daemon) -> None:
     assert_one_sentence(settings(tuned, "set", "p_roll", "999"), 1, "p_roll stays 35")
     assert_one_sentence(settings(tuned, "set", "p_roll", "high"), 1, "p_roll cannot be high: it must be 1..200")
     assert_one_sentence(settings(tuned, "set", "gbl_flg", "5"), 1, "gbl_flg stays")
@@ -86,7 +86,7 @@ def test_a_file_is_backed_up_compared_and_restored(tuned: Daemon, tmp_path: Path
     until(lambda: [line["occasion"] for line in history(tuned)] == ["saved", "saved", "connected"], "the backups")
 
 
-def test_a_dump_is_compared_and_restored_and_its_other_lines_are_listed(tuned: Daemon, tmp_path: Path) -> None:
+def test_a_dump_is_compared_and_restored_and_the_other_lines_are_listed(tuned: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "dump.txt"
     written = settings(tuned, "backup", file)
     assert written.returncode == 0, written
@@ -101,7 +101,7 @@ def test_a_dump_is_compared_and_restored_and_its_other_lines_are_listed(tuned: D
     assert value(tuned, "p_roll") == "44"
 
 
-def test_a_backup_is_compared_and_restored_by_its_number(tuned: Daemon) -> None:
+def test_a_backup_is_compared_and_restored_by_the_number(tuned: Daemon) -> None:
     settings(tuned, "set", "p_roll", "44")
     settings(tuned, "save")
     until(lambda: len(history(tuned)) == 2, "the second backup")
@@ -125,7 +125,7 @@ def test_settings_that_cannot_be_restored_are_named(tuned: Daemon, tmp_path: Pat
     assert value(tuned, "p_roll") == "44"
 
 
-def test_an_unreadable_file_is_one_sentence(tuned: Daemon, tmp_path: Path) -> None:
+def test_an_unreadable_file_is_reported_in_one_sentence(tuned: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "bad.param"
     assert_one_sentence(settings(tuned, "restore", file), 2, "No such file")
     file.write_text("p_roll;44\n")
@@ -160,7 +160,7 @@ def test_an_armed_board_is_listed_but_not_changed(start: Starter, tmp_path: Path
     until(lambda: settings(daemon, "set", "p_roll", "44").returncode == 0, "the disarmed board")
 
 
-def test_a_store_that_fails_prevents_no_restore(start: Starter, tmp_path: Path) -> None:
+def test_a_store_that_fails_does_not_prevent_a_restore(start: Starter, tmp_path: Path) -> None:
     """Its file is locked by another program, and the log says so."""
     daemon = start.daemon("sim:")
     daemon.wait()

@@ -29,7 +29,7 @@ def test_missions_needs_a_daemon() -> None:
     assert "No such option" in ended.stderr
 
 
-def test_a_missing_mission_is_one_sentence(daemon: Daemon) -> None:
+def test_a_missing_mission_is_reported_in_one_sentence(daemon: Daemon) -> None:
     for wrong in (["show", "99999999999999999999"], ["list", "--limit", "99999999999999999999"], ["show", "-1"]):
         ended = ask(daemon, "missions", *wrong)
         assert ended.returncode == 2, ended

@@ -78,7 +78,7 @@ async def test_mavsdk_works_through_zenoh(fleet: Fleet, tmp_path: Path) -> None:
             board.set("armed 0")
 
 
-def test_a_vehicle_that_accepts_no_mavlink_is_reported(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_vehicle_that_does_not_accept_mavlink_is_reported(fleet: Fleet, tmp_path: Path) -> None:
     owl = fleet.start("owl", commands="")
     fleet.wait("owl")
     with relay(tmp_path, fleet, "owl", f"udpout:127.0.0.1:{free_port()}") as program:
@@ -94,7 +94,7 @@ def test_a_vehicle_that_accepts_no_mavlink_is_reported(fleet: Fleet, tmp_path: P
         until(lambda: "kite is back" in program.printed, "its return")
 
 
-def test_an_unknown_vehicle_is_one_sentence(fleet: Fleet) -> None:
+def test_an_unknown_vehicle_is_reported_in_one_sentence(fleet: Fleet) -> None:
     ended = fleet.ask("mavlink", "--vehicle", "owl")
     assert (ended.returncode, ended.stderr) == (1, "naze-bridge: no vehicle 'owl' is alive; there is kite\n")
     assert fleet.ask("mavlink", "--vehicle", "kite", "--gcs", "smoke:1").returncode == 2

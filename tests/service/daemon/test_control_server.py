@@ -72,7 +72,7 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     assert "Traceback" not in daemon.printed
 
 
-def test_a_client_that_disconnects_before_its_reply_does_no_harm(start: Starter) -> None:
+def test_a_client_that_disconnects_before_the_reply_does_no_harm(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     for line in (b'{"do": "pull"}\n', b'{"do": "missions", "limit": 5}\n', b'{"do":'):
@@ -102,7 +102,7 @@ def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signa
     assert not (daemon.state_dir / "control.sock").exists()
 
 
-def test_a_path_too_long_for_a_socket_is_one_sentence(tmp_path: Path) -> None:
+def test_a_path_too_long_for_a_socket_is_reported_in_one_sentence(tmp_path: Path) -> None:
     state = tmp_path / ("long" * 30)
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", "udpout:127.0.0.1:9", "--state-dir", state)
     assert ended.returncode == 1

@@ -51,7 +51,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
             await asyncio.wait([task])
 
 
-async def test_a_connection_that_confirms_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_connection_that_confirms_it_does_not_lose_anything(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here the other end's buffer is full; an adapter that lost its Wi-Fi is as silent."""
     monkeypatch.setattr("service.links.fc_device._TCP_STALL_MS", 100)
     loop = asyncio.get_running_loop()
@@ -81,7 +81,7 @@ async def test_a_connection_that_confirms_nothing_is_lost(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("form", ["udp:127.0.0.1:{}", "udp://127.0.0.1:{}", "udpout:127.0.0.1:{}"])
-async def test_a_board_behind_udp_is_asked_at_its_address(form: str) -> None:
+async def test_a_board_behind_udp_is_asked_at_the_address(form: str) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         board.bind(("127.0.0.1", 0))
         device = await device_opener(parse_fc(form.format(board.getsockname()[1])))()
@@ -114,7 +114,7 @@ async def test_a_board_that_sends_first_is_answered_where_it_sends_from(form: st
         device.close()
 
 
-async def test_a_silent_wifi_bridge_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_silent_wifi_bridge_is_reported_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.links.fc_device._TIMEOUT_S", 0.01)
     port = free_port(socket.SOCK_DGRAM)
     with pytest.raises(PortError) as error:

@@ -358,7 +358,7 @@ async def test_usb_chips_deliver_short_replies_at_once(line: Line, monkeypatch: 
 
 
 @pytest.mark.parametrize("error", [OSError("unplugged"), termios.error(5, "unplugged"), ValueError("unplugged")])
-async def test_a_port_that_takes_no_speed_counts_as_lost(
+async def test_a_port_that_does_not_take_a_speed_counts_as_lost(
     line: Line, error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     port = line.start()

@@ -167,14 +167,14 @@ async def test_a_flight_controller_may_be_behind_tcp(host: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["udpin", "tcpin"])
-async def test_a_link_local_address_keeps_its_interface(links: Links, kind: str) -> None:
+async def test_a_link_local_address_keeps_the_interface(links: Links, kind: str) -> None:
     """The loopback has no such address. Without the interface the kernel would call it an invalid argument."""
     with pytest.raises(LinkError, match="this machine has no such address"):
         links.open(f"{kind}:[fe80::1%lo]:{free_port()}")
 
 
 @pytest.mark.parametrize(("host", "shown"), [("127.0.0.1", "127.0.0.1:{}"), ("::1", "[::1]:{}")])
-async def test_a_station_is_named_by_its_address(links: Links, host: str, shown: str) -> None:
+async def test_a_station_is_named_by_the_address(links: Links, host: str, shown: str) -> None:
     port = free_port()
     link = links.open(f"udpin:[{host}]:{port}")
     client = links.udp(host)

@@ -243,12 +243,12 @@ async def test_noise_is_not_passed_on() -> None:
         ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
     ],
 )
-def test_an_invalid_share_is_one_sentence(entry: object, words: str) -> None:
+def test_an_invalid_share_is_reported_in_one_sentence(entry: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_share(entry, Path())
 
 
-async def test_an_empty_setter_is_no_read(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_empty_setter_is_not_a_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """A Harakiri without the patch executes it with what the request before it left in the receive buffer."""
     unpatched = partial(SimulatedNaze, faults=Faults(extension=False))
     monkeypatch.setattr("simulator.naze.board.SimulatedNaze", unpatched)

@@ -48,7 +48,7 @@ async def test_a_reply_in_pieces_is_waited_for(wire: Wire) -> None:
     assert os.read(wire.board, 10) == b"?"
 
 
-async def test_earlier_input_is_no_reply(wire: Wire) -> None:
+async def test_earlier_input_is_not_a_reply(wire: Wire) -> None:
     os.write(wire.board, b"noise")
     assert await carry_out(ask(b"?", 1, 0.05), wire.port) == b""
 
@@ -61,7 +61,7 @@ async def test_silence_is_an_empty_reply_and_the_next_exchange_follows(wire: Wir
     assert os.read(wire.board, 10) == b"12"
 
 
-async def test_an_unplugged_port_is_one_sentence(wire: Wire) -> None:
+async def test_an_unplugged_port_is_reported_in_one_sentence(wire: Wire) -> None:
     job = asyncio.create_task(carry_out(ask(b"?", 1), wire.port))
     await asyncio.sleep(0.01)
     os.close(wire.board)

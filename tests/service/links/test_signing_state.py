@@ -170,7 +170,7 @@ async def test_it_is_written_every_10_s_but_not_while_nothing_is_signed(
     state.close()
 
 
-async def test_two_links_with_one_key_share_its_state(tmp_path: Path) -> None:
+async def test_two_links_with_one_key_share_the_state(tmp_path: Path) -> None:
     state = Pi(tmp_path).boot()
     recorded = frame(ticks(NOON))
     assert signing(state, UDP).check(recorded) is Check.VALID
@@ -221,7 +221,7 @@ async def test_an_unwritable_disk_does_not_stop_signing(tmp_path: Path) -> None:
     assert "state.not_stored" in [entry["event"] for entry in logged]
 
 
-async def test_the_file_is_private_and_holds_no_key(tmp_path: Path) -> None:
+async def test_the_file_is_private_and_does_not_hold_a_key(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
     signing(state).check(frame(ticks(NOON)))

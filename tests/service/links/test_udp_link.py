@@ -113,7 +113,7 @@ async def test_datagrams_of_others_that_arrive_before_a_socket_is_connected_are_
     assert links.events.received[2] == (peer, b"own")
 
 
-async def test_a_station_whose_program_restarts_keeps_its_socket(links: Links) -> None:
+async def test_a_station_whose_program_restarts_keeps_the_socket(links: Links) -> None:
     port = free_port(socket.SOCK_DGRAM)
     link = links.open(f"udpin:127.0.0.1:{port}")
     client = links.udp()

@@ -165,7 +165,7 @@ async def test_the_lane_is_served_beside_a_busy_loop(port: Port) -> None:
             await asyncio.sleep(0)
 
 
-async def test_an_error_is_reported_with_its_handle(port: Port) -> None:
+async def test_an_error_is_reported_with_the_handle(port: Port) -> None:
     """The daemon restarts the flight controller's line then."""
     reported: list[dict[str, Any]] = []
     port.loop.set_exception_handler(lambda _, context: reported.append(context))
@@ -234,7 +234,7 @@ def waiting(request: pytest.FixtureRequest) -> Iterator[Waiting]:
 
 
 @pytest.mark.parametrize("waiting", [(0.1, 0.2, 3.0)], indirect=True)
-def test_a_hold_ends_at_its_time_and_the_timer_is_not_early(waiting: Waiting) -> None:
+def test_a_hold_ends_at_the_time_and_the_timer_is_not_early(waiting: Waiting) -> None:
     waiting.lane.hold(1.0)
     waiting.lane.set_timer(4.0, waiting.ticks.append)
     assert waiting.selector.select(5.0) == []
@@ -244,7 +244,7 @@ def test_a_hold_ends_at_its_time_and_the_timer_is_not_early(waiting: Waiting) ->
 
 
 @pytest.mark.parametrize("waiting", [(1.0, 2.0)], indirect=True)
-def test_the_loop_gets_no_turn_for_what_it_was_asked_before(waiting: Waiting) -> None:
+def test_the_loop_does_not_get_a_turn_for_what_it_was_asked_before(waiting: Waiting) -> None:
     waiting.selector.has_work = True
     assert waiting.selector.select(5.0) == []
     assert waiting.now == 5.0
@@ -252,7 +252,7 @@ def test_the_loop_gets_no_turn_for_what_it_was_asked_before(waiting: Waiting) ->
 
 
 @pytest.mark.parametrize("waiting", [(0.1,)], indirect=True)
-def test_a_port_that_was_held_is_closed_with_its_hold(waiting: Waiting) -> None:
+def test_a_port_that_was_held_is_closed_with_the_hold(waiting: Waiting) -> None:
     waiting.lane.hold(3.0)
     waiting.lane.unwatch()
     waiting.lane.watch(waiting._port, waiting._read)

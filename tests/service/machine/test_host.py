@@ -39,7 +39,7 @@ def test_a_missing_file_and_a_binary_one_are_texts(tmp_path: Path) -> None:
     assert machine.read("/x").startswith("a")
 
 
-def test_a_login_console_is_found_by_its_terminal(tmp_path: Path) -> None:
+def test_a_login_console_is_found_by_the_terminal(tmp_path: Path) -> None:
     machine = FaultyMachine(tmp_path)
     assert not machine.has_login("ttyAMA0")
     machine.runs(7, "/sbin/agetty", "-o", "--keep-baud", "ttyAMA0")

@@ -45,7 +45,7 @@ log.info("gcs.found", station="two")
     assert (events[21]["of"], events[21]["times"], events[21]["level"]) == ("gcs.found", 30, "warning")
 
 
-def test_the_journal_gets_each_line_with_its_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_journal_gets_each_line_with_the_priority(monkeypatch: pytest.MonkeyPatch) -> None:
     """sd-daemon(3): <4> is a warning. The journal has its own times."""
     monkeypatch.setenv("JOURNAL_STREAM", "8:1")
     printed = run('log.warning("fc.lost"); log.info("fc.found", speed=115200)').stderr
@@ -57,7 +57,7 @@ def test_the_journal_gets_each_line_with_its_priority(monkeypatch: pytest.Monkey
     )
 
 
-def test_a_terminal_gets_no_escape_sequences_of_others() -> None:
+def test_a_terminal_does_not_get_escape_sequences_of_others() -> None:
     ours, terminal = os.openpty()
     script = BEGIN + 'log.info("fc.lost", why="a\\x1b[2Jb")'
     subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, stderr=terminal, timeout=TIMEOUT_S, check=True)

@@ -28,7 +28,7 @@ def test_the_end_does_not_wait_for_a_hung_disk() -> None:
     assert thread.close(timeout_s=10)
 
 
-async def test_a_question_gets_its_answer_or_its_error() -> None:
+async def test_a_question_gets_the_answer_or_the_error() -> None:
     thread = BackgroundThread("test")
     assert await thread.ask(lambda: 7) == 7
     with pytest.raises(ZeroDivisionError):

@@ -41,7 +41,7 @@ def test_files_are_named_after_their_first_record_in_utc(tmp_path: Path) -> None
     assert (tmp_path / "state" / "logs" / "2026-11-21 12-00-00.tlog").read_bytes() == 3 * record()
 
 
-def test_a_clock_that_was_set_back_overwrites_nothing(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_back_does_not_overwrite_anything(tmp_path: Path) -> None:
     folder = TlogFolder(tmp_path, TlogLimits())
     for count in (1, 2, 3):
         fill(folder, NOON, count)
@@ -88,7 +88,7 @@ def test_files_that_are_too_old_are_deleted(tmp_path: Path) -> None:
     assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
 
 
-def test_other_files_are_left_alone(tmp_path: Path) -> None:
+def test_other_files_are_not_touched(tmp_path: Path) -> None:
     others = ["2020-01-01 00-00-00.tlog.bak", "2020-01-01 00-00-00.rlog", "flight.tlog", "notes.txt"]
     for name in others:
         (tmp_path / name).write_bytes(bytes(10_000))
@@ -116,7 +116,7 @@ def test_an_unusable_folder_is_reported_once_and_retried(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("is_recording", [False, True])
-def test_nothing_is_written_to_a_nearly_full_disk(tmp_path: Path, is_recording: bool) -> None:
+def test_does_not_write_to_a_nearly_full_disk(tmp_path: Path, is_recording: bool) -> None:
     free = [PLENTY]
     folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
     if is_recording:

@@ -33,7 +33,7 @@ def test_any_value_is_read_or_refused_in_one_line(reader: Reader, value: object)
 
 
 @given(value=st.integers())
-def test_a_number_is_accepted_from_its_least_to_its_most(value: int) -> None:
+def test_a_number_is_accepted_from_the_least_to_the_most(value: int) -> None:
     if 1 <= value <= 9:
         assert whole(1, 9).read(value, HERE) == value
     else:
@@ -41,7 +41,7 @@ def test_a_number_is_accepted_from_its_least_to_its_most(value: int) -> None:
             whole(1, 9).read(value, HERE)
 
 
-def test_true_is_no_number_and_one_is_not_true() -> None:
+def test_true_is_not_a_number_and_one_is_not_true() -> None:
     with pytest.raises(Unfit, match="whole number"):
         whole(0, 1).read(True, HERE)
     with pytest.raises(Unfit, match="true or false"):

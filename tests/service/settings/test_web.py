@@ -36,7 +36,7 @@ def test_the_table_has_defaults_and_is_read(tmp_path: Path) -> None:
         ("[web]\ntoken_file = ''", ["web.token_file is ''", "text in quotes"]),
     ],
 )
-def test_an_invalid_table_is_one_sentence(tmp_path: Path, text: str, reason: list[str]) -> None:
+def test_an_invalid_table_is_reported_in_one_sentence(tmp_path: Path, text: str, reason: list[str]) -> None:
     with pytest.raises(SettingsError) as caught:
         load(tmp_path, text)
     (problem,) = map(str, caught.value.problems)

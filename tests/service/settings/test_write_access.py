@@ -108,7 +108,7 @@ def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
         (f'{{address = "{LINK}", writers = ["laptop"]}}', "write 192.168.4.0/24"),
     ],
 )
-def test_an_invalid_table_is_one_sentence(tmp_path: Path, entry: str, reason: str) -> None:
+def test_an_invalid_table_is_reported_in_one_sentence(tmp_path: Path, entry: str, reason: str) -> None:
     assert reason in complaint(tmp_path, entry)
 
 
@@ -123,7 +123,7 @@ def test_a_key_file_readable_by_others_is_refused(key_file: Path, mode: int) -> 
     ("content", "passphrase"),
     [(b"plain", "plain"), (b"with spaces \n", "with spaces "), (b"dos\r\n", "dos"), ("Grüße\n".encode(), "Grüße")],
 )
-def test_the_passphrase_is_the_line_without_its_end(key_file: Path, content: bytes, passphrase: str) -> None:
+def test_the_passphrase_is_the_line_without_the_end(key_file: Path, content: bytes, passphrase: str) -> None:
     key_file.write_bytes(content)
     assert read_passphrase(key_file) == passphrase
 

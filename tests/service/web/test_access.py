@@ -15,7 +15,7 @@ pytest_plugins = ("tests.support.web_fixtures",)
 RESTORE = "/api/missions/1/restore"
 
 
-def test_reading_needs_no_token(shared_web: WebBench) -> None:
+def test_reading_does_not_need_a_token(shared_web: WebBench) -> None:
     page = shared_web.ask("/")
     assert (page.status, page.headers["Content-Type"]) == (200, "text/html; charset=utf-8")
     assert shared_web.ask("/api/missions").data["missions"][0]["source"] == "push of naze-field.waypoints"
@@ -66,7 +66,7 @@ def test_restoring_needs_the_token(shared_web: WebBench, name: str) -> None:
     assert token not in shared_web.daemon.printed
 
 
-def test_opening_a_url_restores_nothing(shared_web: WebBench) -> None:
+def test_opening_a_url_does_not_restore_anything(shared_web: WebBench) -> None:
     answer = shared_web.ask(RESTORE, Authorization=f"Bearer {shared_web.token}")
     assert (answer.status, answer.headers["Allow"]) == (405, "POST")
     assert shared_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405

@@ -54,7 +54,7 @@ def pass_time(limit: ConnectionLimit, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("hosts", [20, 150])
-def test_a_crowd_of_addresses_does_not_keep_the_page_from_another_one(hosts: int) -> None:
+def test_a_crowd_of_addresses_does_not_keep_the_page_from_another(hosts: int) -> None:
     """Each address opens as many connections as it can, and none of them ends by itself."""
     limit = ConnectionLimit()
     for number in range(10 * MAX_CONNECTIONS):
@@ -67,7 +67,7 @@ def test_a_crowd_of_addresses_does_not_keep_the_page_from_another_one(hosts: int
     assert all(each.is_aborted or each.served_at is not None for each in page)
 
 
-def test_an_ipv6_host_counts_as_one_with_any_of_its_addresses() -> None:
+def test_an_ipv6_host_counts_as_one_with_any_of_the_addresses() -> None:
     limit = ConnectionLimit()
     page = Visitor("fe80::1%wlan0", limit).visit()
     for number in range(2 * MAX_CONNECTIONS):

@@ -13,7 +13,7 @@ pytest_plugins = ("tests.support.web_fixtures",)
 
 
 @pytest.mark.parametrize(("size", "dark"), [(LAPTOP, False), (PHONE, True)])
-def test_axe_finds_no_violation_in_any_state(
+def test_axe_does_not_find_a_violation_in_any_state(
     browsers: Browsers, web: WebBench, size: tuple[int, int], *, dark: bool
 ) -> None:
     assert web.board is not None

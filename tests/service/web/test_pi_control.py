@@ -86,7 +86,7 @@ def test_reading_needs_the_token(web: WebBench, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", ["/api/pi", "/api/pi/package?start=0"])
-def test_changing_needs_the_token_and_its_header(web: WebBench, path: str) -> None:
+def test_changing_needs_the_token_and_the_header(web: WebBench, path: str) -> None:
     for authorization in ({}, {"Authorization": "Bearer wrong"}, {"Cookie": f"token={web.token}"}):
         assert web.post(path, _RESTART, **_JSON, **authorization).status == 401
 
@@ -99,11 +99,11 @@ def test_a_form_of_another_site_is_refused(web: WebBench) -> None:
 @pytest.mark.parametrize(
     "body", [b"", b"7", b"[]", b"{}", b"\xff", b"{" * 5000, b'{"action": "shell"}', b'{"action": ["fix"]}']
 )
-def test_what_is_no_request_is_refused(web: WebBench, body: bytes) -> None:
+def test_what_is_not_a_request_is_refused(web: WebBench, body: bytes) -> None:
     assert post(web, "/api/pi", body).status == 422
 
 
-def test_nothing_is_changed_while_the_craft_is_armed(web: WebBench) -> None:
+def test_does_not_change_anything_while_the_craft_is_armed(web: WebBench) -> None:
     assert web.board is not None
     web.board.set("armed 1")
     until(lambda: web.state()["last_heard"]["armed"], "the armed craft")
@@ -118,7 +118,7 @@ def test_nothing_is_changed_while_the_craft_is_armed(web: WebBench) -> None:
         until(lambda: web.state()["last_heard"]["armed"] is False, "the disarmed craft")
 
 
-def test_nothing_is_changed_while_firmware_is_flashed(tmp_path: Path) -> None:
+def test_does_not_change_anything_while_firmware_is_flashed(tmp_path: Path) -> None:
     report = SimpleNamespace(last_heard=SimpleNamespace(armed=False))
     daemon: Any = SimpleNamespace(report=lambda: report, fc=SimpleNamespace(is_lent=True))
     token = Token(tmp_path / "token")

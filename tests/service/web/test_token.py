@@ -27,7 +27,7 @@ def test_a_wrong_token_is_refused(tmp_path: Path, shown: str | None) -> None:
     assert not token.is_shown_by(None if shown is None else shown.format(text))
 
 
-def test_an_invalid_token_file_is_one_sentence(tmp_path: Path) -> None:
+def test_an_invalid_token_file_is_reported_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "open").write_text("a token readable by all")
     (tmp_path / "open").chmod(0o644)
     (tmp_path / "empty").touch(0o600)

@@ -42,7 +42,7 @@ def page(laptop: Browser) -> Iterator[Browser]:
     assert laptop.errors() == []
 
 
-def test_the_first_paint_is_small_and_loads_nothing_from_elsewhere(page: Browser) -> None:
+def test_the_first_paint_is_small_and_does_not_load_anything_from_elsewhere(page: Browser) -> None:
     addresses, size = page.traffic()
     assert addresses
     assert {address for address in addresses if not address.startswith(page.url)} == set()

@@ -46,7 +46,7 @@ def error(answers: list[Any]) -> str:
     return reason
 
 
-def test_an_upload_reports_its_progress_and_result(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_an_upload_reports_the_progress_and_result(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     *progress, last = ask(opened, UPLOAD, mission_file(60), consolidation=zenoh.ConsolidationMode.NONE)
     assert [each["of"] for each in progress] == [60] * len(progress)
@@ -62,7 +62,7 @@ def test_by_default_a_caller_gets_only_the_result(commanded: tuple[Bench, zenoh.
     assert answer["result"]["text"].startswith("40 of 40 stored: ")
 
 
-def test_a_check_changes_nothing(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_a_check_does_not_change_anything(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     before, missions = bench.board.records(), len(bench.daemon.missions())
     (answer,) = ask(opened, CHECK, mission_file(12, start=7))
@@ -157,7 +157,7 @@ def test_only_one_transfer_runs_at_a_time(commanded: tuple[Bench, zenoh.Session]
     assert f"{verified[0]['checksum']}" == bench.daemon.pull()["checksum"]
 
 
-def test_nothing_is_written_while_armed(start: Starter) -> None:
+def test_does_not_write_anything_while_armed(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with session(connect=where) as opened:

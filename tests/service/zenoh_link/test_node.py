@@ -72,7 +72,7 @@ def test_the_daemon_joins_a_router_that_starts_late_or_restarts(start: Starter, 
         assert state["mission"]["count"] == 12
 
 
-def test_two_peers_need_no_router(start: Starter) -> None:
+def test_two_peers_do_not_need_a_router(start: Starter) -> None:
     """The later peer queries for earlier events."""
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
@@ -115,7 +115,7 @@ def test_an_upload_succeeds_although_the_router_hangs(start: Starter, tmp_path: 
         assert bench.daemon.end() == 0
 
 
-def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
+def test_a_stalled_subscriber_does_not_delay_anything(start: Starter) -> None:
     """Missions, other subscribers and the daemon's shutdown are unaffected."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
@@ -131,7 +131,7 @@ def test_a_stalled_subscriber_delays_nothing(start: Starter) -> None:
     assert "Traceback" not in bench.daemon.printed
 
 
-def test_a_failed_connection_is_reported_with_its_reason(start: Starter) -> None:
+def test_a_failed_connection_is_reported_with_the_reason(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')
     alone = until(lambda: bench.daemon.has_logged("zenoh.alone"), "a log entry about it")

@@ -33,7 +33,7 @@ def test_a_metered_group_is_sent_every_5_s_at_most(gaps_s: list[float]) -> None:
 
 
 @given(GAPS_S)
-def test_the_full_profile_limits_nothing(gaps_s: list[float]) -> None:
+def test_the_full_profile_does_not_limit_anything(gaps_s: list[float]) -> None:
     times = times_of(gaps_s)
     assert sent_at(SampleRates(is_metered=False), times) == times
 

@@ -31,7 +31,7 @@ def test_a_job_that_raises_does_not_end_the_thread() -> None:
     assert "zenoh.not_sent" in [event["event"] for event in events]
 
 
-def test_a_failed_declaration_closes_its_session_and_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_declaration_closes_the_session_and_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session, "_RETRY_S", 0.01)
     sessions: list[zenoh.Session] = []
     declared = threading.Event()

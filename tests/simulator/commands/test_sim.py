@@ -111,7 +111,7 @@ def test_a_naze_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
         assert client.payload(100)[0] == 211
 
 
-def test_a_second_client_waits_for_its_turn(start: Callable[..., Simulator]) -> None:
+def test_a_second_client_waits_for_the_turn(start: Callable[..., Simulator]) -> None:
     simulator = start("--kind", "inav")
     with simulator.client() as first, simulator.client() as second:
         assert first.payload(2) == b"INAV"
@@ -168,7 +168,7 @@ def test_truth_reports_the_flight(start: Callable[..., Simulator]) -> None:
         (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
     ],
 )
-def test_an_invalid_option_is_one_sentence(options: tuple[str, ...], says: str) -> None:
+def test_an_invalid_option_is_reported_in_one_sentence(options: tuple[str, ...], says: str) -> None:
     ended = run_naze_bridge("sim", *options)
     assert ended.returncode != 0
     assert says in ended.stderr

@@ -40,7 +40,7 @@ def test_systick_interrupts_every_millisecond() -> None:
     assert rig.handler_log() == [15] * 50
 
 
-def test_systick_counts_down_and_its_flag_is_cleared_by_reading() -> None:
+def test_systick_counts_down_and_the_flag_is_cleared_by_reading() -> None:
     steps = ticking(72_000, interrupt=False).load(SYST_CVR).load(SYST_CVR).wait(SYST_CSR, 1 << 16).load(SYST_CSR)
     first, second, control = Rig(steps).run(0.01).log(3)
     assert 71_000 < second < first < 72_000
@@ -75,7 +75,7 @@ def test_a_reset_keeps_ram_and_a_power_cut_does_not() -> None:
     assert rig.ram(0x4000, 2) != b"\xfe\xca"
 
 
-def test_a_reset_needs_its_key() -> None:
+def test_a_reset_needs_the_key() -> None:
     assert Rig(Steps().store(AIRCR, 1 << 2)).run(0.001).board.counters.resets == 0
 
 
@@ -105,7 +105,7 @@ def test_pins_read_their_driven_or_external_level() -> None:
     assert Rig(steps).run(0.001).log(4) == [0x7FFF, 0x7FFF, 0x7EFF, 1 << 8]
 
 
-def test_a_timer_counts_at_its_prescaled_clock() -> None:
+def test_a_timer_counts_at_the_prescaled_clock() -> None:
     timer, cr1, cnt, psc, arr = 0x4000_0000, 0, 0x24, 0x28, 0x2C
     steps = ticking(72_000, interrupt=False).store(timer + psc, 71).store(timer + arr, 0xFFFF).store(timer + cr1, 1)
     steps.store(timer + cnt, 0).wait(SYST_CSR, 1 << 16).wait(SYST_CSR, 1 << 16).load(timer + cnt)

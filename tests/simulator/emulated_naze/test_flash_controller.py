@@ -22,7 +22,7 @@ def erase(steps: Steps) -> Steps:
     return steps.store(CR, PER).store(AR, PLACE).store(CR, PER | STRT).store(CR, 0)
 
 
-def test_nothing_is_written_without_the_keys() -> None:
+def test_does_not_write_anything_without_the_keys() -> None:
     steps = Steps().load(CR).store(KEYR, 0x4567_0123).store(KEYR, 1).store(CR, PG).store_half(PLACE, 0x1234).load(CR)
     rig = Rig(steps.load(PLACE).load(SR)).run(0.01)
     assert rig.log(4) == [LOCK, LOCK, 0xFFFF_FFFF, PROGRAM_ERROR]
@@ -34,7 +34,7 @@ def test_half_words_can_only_be_programmed_into_erased_flash() -> None:
     assert Rig(steps).run(0.01).log(4) == [END, PROGRAM_ERROR, 0xFFFF_1234, 0xFFFF_0000]
 
 
-def test_erasing_a_page_leaves_its_neighbours() -> None:
+def test_erasing_a_page_leaves_the_neighbours() -> None:
     flash = memoryview(bytearray(bytes(0x2_0000)))
     rig = Rig(erase(unlock()), flash=flash).run(0.1)
     assert bytes(flash[PAGE : PAGE + 1024]) == b"\xff" * 1024

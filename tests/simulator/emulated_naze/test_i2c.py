@@ -67,12 +67,12 @@ def test_the_board_is_level_and_at_rest() -> None:
     assert all(abs(rate) <= 4 for rate in rotation)
 
 
-def test_a_register_keeps_its_value_until_a_reset() -> None:
+def test_a_register_keeps_the_value_until_a_reset() -> None:
     assert ask(MPU6050, 0x1B, 2, (0x1B, 0x18, 0x10)) == [0x18, 0x10]
     assert ask(MPU6050, 0x1B, 2, (0x1B, 0x18, 0x10), (0x6B, 0x80)) == [0, 0]
 
 
-def test_the_magnetometer_identifies_itself_and_passes_its_self_test() -> None:
+def test_the_magnetometer_identifies_itself_and_passes_the_self_test() -> None:
     assert ask(HMC5883L, 10, 3) == [*b"H43"]
     without, positive, negative = (signed(*ask(HMC5883L, 3, 2, (0, mode))) for mode in (0x10, 0x11, 0x12))
     assert abs(without - 300) <= 1

@@ -73,7 +73,7 @@ def test_a_waypoint_is_flown() -> None:
 
 
 @pytest.mark.parametrize(("onward", "overshoot"), [(80.0, 0.0), (54.0, 8.0), (20.0, 12.0)])
-def test_the_way_to_the_next_place_is_no_overshoot(onward: float, overshoot: float) -> None:
+def test_the_way_to_the_next_place_is_not_an_overshoot(onward: float, overshoot: float) -> None:
     flight = Flight().go(20, north=50).say(reached=1, record=2).go(9, north=12).go(9, north=onward - 62).say(reached=2)
     first, _ = flight.go(1).judged(*(record(WpCommand.WAYPOINT, north, time=1) for north in (50.0, onward)))
     assert first.overshoot_m == pytest.approx(overshoot, abs=0.1)
@@ -145,7 +145,7 @@ def test_turns_are_counted_with_their_sign() -> None:
     assert is_flown([result])
 
 
-def test_a_landing_far_from_its_descent_is_a_fault() -> None:
+def test_a_landing_far_from_the_descent_is_a_fault() -> None:
     descent = Flight().go(5).say(state=FlightPhase.DESCENT, record=1).go(20, north=9, up=-10)
     assert "landed 8.9 m" in descent.judged(record(WpCommand.LAND), landed=True)[0].problems[0]
     calm = Flight().go(5).say(state=FlightPhase.DESCENT, record=1).go(20, north=2, up=-10)

@@ -51,7 +51,7 @@ DONE = FlightProgress(FlightPhase.DONE, FlightReason.FLOWN, switch_on=True, in_c
 HELD = FlightProgress(FlightPhase.HELD, FlightReason.STALLED, switch_on=True, in_command=True, record=1)
 
 
-def test_a_flight_to_the_end_of_its_list() -> None:
+def test_a_flight_to_the_end_of_the_list() -> None:
     found = logged_sortie(tlog(flight(2.0, DONE)) + b"cut off", RECORDS)
     assert found.is_flown
     assert found.items[0].reached_s == pytest.approx(20, abs=0.5)
@@ -60,7 +60,7 @@ def test_a_flight_to_the_end_of_its_list() -> None:
     assert found.extremes.steepest_deg == pytest.approx(5.7, abs=0.1)
 
 
-def test_a_flight_that_was_stopped_tells_its_reason() -> None:
+def test_a_flight_that_was_stopped_tells_the_reason() -> None:
     found = logged_sortie(tlog(flight(1.0, HELD)), RECORDS)
     assert not found.is_flown
     assert found.items[0].problems == ["not reached", "the flight was stopped: stalled"]

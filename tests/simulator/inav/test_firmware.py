@@ -37,7 +37,7 @@ def test_replies_have_the_lengths_of_each_version(version: str) -> None:
     assert (len(bench.payload(119)), len(bench.payload(116))) == BOXES[version]
 
 
-def test_the_identity_names_inav_and_its_version() -> None:
+def test_the_identity_names_inav_and_the_version() -> None:
     bench = MspBench("inav", MspOptions(version="7.1.2"))
     assert (bench.payload(1), bench.payload(2), bench.payload(3)) == (b"\x00\x02\x05", b"INAV", b"\x07\x01\x02")
 

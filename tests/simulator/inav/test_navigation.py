@@ -94,7 +94,7 @@ def test_during_a_mission_lower_modes_are_reported_too() -> None:
     assert flight.modes() == {"ARM", "ANGLE", "NAV WP", "NAV ALTHOLD"}
 
 
-def test_a_hold_lasts_its_time() -> None:
+def test_a_hold_lasts_the_time() -> None:
     flight = Flight(waypoint(3, NavAction.POSHOLD_TIME, p1=20, p2=400), waypoint(6))
     flight.until(is_finished)
     held = [status for status in flight.seen if status[1] == 4]
@@ -216,7 +216,7 @@ def test_another_waypoint_is_flown_to_and_the_mission_goes_on_from_there() -> No
     assert flight.numbers() == [1, 3, 4]
 
 
-def test_a_waypoint_without_a_place_leads_to_the_next_one() -> None:
+def test_a_waypoint_without_a_place_leads_to_the_next() -> None:
     flight = Flight(waypoint(20), waypoint(30, NavAction.SET_POI), waypoint(40), waypoint(60))
     flight.until(lambda status: status[:2] == (NAV, 5))
     assert sets_index(flight.bench, 1)

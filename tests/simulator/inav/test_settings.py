@@ -14,7 +14,7 @@ def set_text(bench: MspBench, name: str, text: bytes) -> bytes:
     return bench.payload_v2(COMMON_SETTING, name.encode() + b"\0")
 
 
-def test_a_text_fills_its_place_and_the_bytes_behind_its_end_stay() -> None:
+def test_a_text_fills_the_place_and_the_bytes_behind_the_end_stay() -> None:
     bench = MspBench("inav")
     assert set_text(bench, "pilot_name", b"Ann") == b"Ann".ljust(16, b"\0")
     assert set_text(bench, "pilot_name", b"x" * 17) == b"x" * 16

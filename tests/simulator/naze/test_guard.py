@@ -62,7 +62,7 @@ def test_an_empty_setter_stores_what_the_buffer_holds_only_without_the_patch(
     assert (bench.payload(request(getter)) == before) is extension
 
 
-def test_wp_needs_its_number() -> None:
+def test_wp_needs_the_number() -> None:
     bench = Bench()
     assert is_refused(bench, MspCommand.WP)
     assert not is_refused(bench, MspCommand.WP, b"\0")

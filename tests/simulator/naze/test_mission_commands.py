@@ -84,7 +84,7 @@ def test_info_has_the_boards_limits() -> None:
     )
 
 
-def test_without_the_extension_its_commands_are_unknown() -> None:
+def test_without_the_extension_the_commands_are_unknown() -> None:
     bench = Bench(faults=Faults(extension=False))
     answer = bench.ask(INFO_REQUEST)
     assert answer is not None
@@ -196,7 +196,7 @@ def test_begin_of_the_same_list_continues_and_of_another_starts_again() -> None:
     assert bench.progress(encode_begin(identify(mission(20, 1)))) == Staged(ReplyStatus.OK, 0, 0)
 
 
-def test_a_repeated_chunk_is_ignored_and_its_reply_has_the_progress() -> None:
+def test_a_repeated_chunk_is_ignored_and_the_reply_has_the_progress() -> None:
     bench, records = Bench(), mission(20)
     bench.progress(encode_begin(identify(records)))
     standing = bench.progress(encode_chunk(pack_records(records), 0, 10).frame)

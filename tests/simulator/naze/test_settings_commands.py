@@ -111,7 +111,7 @@ def test_a_pending_write_allows_reading_only(bench: Bench) -> None:
     assert answer(bench, encode_read_settings(0, 1)).status is ReplyStatus.OK
 
 
-def test_another_accelerometer_clears_its_trims(bench: Bench) -> None:
+def test_another_accelerometer_clears_the_trims(bench: Bench) -> None:
     put(bench, "rc_trm_rll", 7.5)
     put(bench, "acc_hdw", 1)
     assert held(bench, "rc_trm_rll") == 0

@@ -66,7 +66,7 @@ def test_sent_bytes_leave_at_line_rate() -> None:
 
 
 @given(st.lists(st.tuples(st.binary(min_size=1, max_size=100), st.floats(0.0005, 0.03)), max_size=30))
-def test_nothing_is_lost_unless_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
+def test_does_not_lose_anything_unless_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
     uart, counters = make()
     sent, now, outstanding = b"", 0.0, 0.0
     received = b""
@@ -97,7 +97,7 @@ def test_more_than_255_outstanding_bytes_corrupt_each_other() -> None:
     assert out == b"b" * 44
 
 
-def test_the_end_of_a_burst_is_its_departure_time() -> None:
+def test_the_end_of_a_burst_is_the_departure_time() -> None:
     uart, _ = make()
     uart.write(b"q" * 90, 1.0)
     departure = uart.next_departure()
@@ -137,7 +137,7 @@ def test_half_the_speed_doubles_each_bit() -> None:
     assert garble(b"U", 9600, 19200)[0] == 0x66
 
 
-def test_a_disconnected_port_carries_nothing() -> None:
+def test_a_disconnected_port_does_not_carry_anything() -> None:
     assert garble(b"hello", 0, 115200) == b""
 
 

@@ -39,7 +39,7 @@ def test_a_seed_repeats() -> None:
     assert winds[0] == winds[1] != winds[2]
 
 
-def test_wandering_forgets_within_its_memory() -> None:
+def test_wandering_forgets_within_the_memory() -> None:
     wander = Wander(random.Random(1), 1.0, 60.0)
     values = [wander.step(0.2) for _ in range(200_000)]
 

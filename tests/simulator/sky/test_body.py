@@ -82,7 +82,7 @@ def test_without_drag_turning_energy_and_momentum_are_kept(p: float, q: float, r
 
 
 @given(speed=st.floats(1, 15))
-def test_drag_slows_it_as_its_time_constant_says(speed: float) -> None:
+def test_drag_slows_it_as_the_time_constant_says(speed: float) -> None:
     body = airborne()
     body.velocity = (speed, 0.0, 0.0)
     run(body, 1.0)
@@ -98,7 +98,7 @@ def test_wind_carries_it_away() -> None:
 
 
 @pytest.mark.parametrize("factor", [1.0, 2.0])
-def test_it_hovers_near_half_throttle_whatever_its_weight(factor: float) -> None:
+def test_it_hovers_near_half_throttle_regardless_of_the_weight(factor: float) -> None:
     pulse = hover_pulse(Airframe().scaled(factor))
     assert 1450 < pulse < 1550
 
@@ -152,7 +152,7 @@ def test_rotating_there_and_back(heading: float, x: float, y: float, z: float) -
     assert to_world(facing(90.0), (1.0, 0.0, 0.0)) == pytest.approx((0.0, -1.0, 0.0), abs=1e-9)
 
 
-def test_a_soft_touch_down_is_no_crash_and_a_weak_motor_tilts_it() -> None:
+def test_a_soft_touch_down_is_not_a_crash_and_a_weak_motor_tilts_it() -> None:
     body = Body()
     body.position = (0.0, 0.0, 0.1)
     for _ in range(500):

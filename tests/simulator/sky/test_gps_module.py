@@ -60,7 +60,7 @@ def test_it_speaks_nmea_until_it_is_configured() -> None:
     assert {kind for kind, _ in frames(run(gps, 1.0, begin=1.0))} == {0x02, 0x03, 0x06, 0x12}
 
 
-def test_it_obeys_a_change_of_speed_and_then_knows_no_other() -> None:
+def test_it_obeys_a_change_of_speed_and_then_does_not_know_another() -> None:
     gps = GpsModule(Place())
     gps.hear(TO_115200, 9600)
     gps.advance(0.0, ZERO, ZERO)
@@ -91,7 +91,7 @@ def test_five_fixes_a_second_each_a_fifth_of_a_second_old() -> None:
     assert gps.take(20.21, BAUD) != b""
 
 
-def test_position_and_speed_in_its_units() -> None:
+def test_position_and_speed_in_the_units() -> None:
     place = Place()
     sent = frames(run(ubx(), 1.0, (100.0, 50.0, 20.0), (3.0, -4.0, 1.0)))
     position = next(payload for kind, payload in sent if kind == 0x02)
@@ -104,7 +104,7 @@ def test_position_and_speed_in_its_units() -> None:
     assert course / 1e5 == pytest.approx(53.1, abs=4)
 
 
-def test_a_hidden_sky_is_no_fix_and_a_broken_wire_is_silence() -> None:
+def test_a_hidden_sky_is_not_a_fix_and_a_broken_wire_is_silence() -> None:
     gps = ubx()
     gps.has_fix = False
     solution = next(payload for kind, payload in frames(run(gps, 1.0)) if kind == 0x06)

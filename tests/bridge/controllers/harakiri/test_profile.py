@@ -38,7 +38,7 @@ def test_lost_bytes_delay_identification_but_never_change_it() -> None:
         assert world.kind is harakiri.PATCHED
 
 
-def test_the_arm_box_is_found_by_its_name() -> None:
+def test_the_arm_box_is_found_by_the_name() -> None:
     for boxes in (b"ARM;ANGLE;", b"ANGLE;ARM;HORIZON;", b"ANGLE;HORIZON;ARM"):
         flags = 1 << boxes.split(b";").index(b"ARM")
         status = bytes(6) + flags.to_bytes(4, "little") + b"\0"

@@ -43,7 +43,7 @@ def test_a_bad_line_gives_the_true_table_or_none(seed: int) -> None:
     assert table_checksum(held) == table_checksum(NAZE_SETTINGS)
 
 
-def test_an_armed_harakiri_in_mavlink_mode_keeps_its_table() -> None:
+def test_an_armed_harakiri_in_mavlink_mode_keeps_the_table() -> None:
     faults = Faults()
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
     client = SettingsClient(world)

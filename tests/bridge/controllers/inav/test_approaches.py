@@ -77,7 +77,7 @@ def refusing(answer: Callable[[int, bytes, float], bytes | None], refused: int) 
     return answer_or_refuse
 
 
-def test_a_mission_is_not_saved_without_its_approach(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mission_is_not_saved_without_the_approach(monkeypatch: pytest.MonkeyPatch) -> None:
     board, _, station = board_with(version="9.1.0", platform=_PLANE)
     set_approaches(board, 8)
     places_of(board).save()
@@ -109,7 +109,7 @@ def test_a_deleted_or_moved_rally_points_approach_is_named_and_not_inherited() -
     assert lost in " ".join(station.texts())
 
 
-def test_an_approach_of_a_place_that_is_no_rally_point_is_cleared() -> None:
+def test_an_approach_of_a_place_that_is_not_a_rally_point_is_cleared() -> None:
     board, _, station = board_with(version="9.1.0")
     set_approaches(board, 0, 5)
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED

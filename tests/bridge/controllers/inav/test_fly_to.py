@@ -71,7 +71,7 @@ def test_it_is_sent_once_and_verified() -> None:
     assert inav.set_to == [3]
 
 
-def test_a_lost_reply_is_no_failure_if_the_craft_flies_there() -> None:
+def test_a_lost_reply_is_not_a_failure_if_the_craft_flies_there() -> None:
     inav = Inav(lost=frozenset((0x2221,)))
     assert run(inav) is None
     assert inav.set_to == [3], "not repeated"
@@ -114,7 +114,7 @@ def changed(**values: int) -> Callable[[], Inav]:
         (changed(error=FINISHED, action=NavAction.LAND), "landing"),
     ],
 )
-def test_nothing_is_sent_unless_the_mission_is_in_flight(make: Callable[[], Inav], text: str) -> None:
+def test_does_not_send_anything_unless_the_mission_is_in_flight(make: Callable[[], Inav], text: str) -> None:
     inav = make()
     refusal = run(inav)
     assert refusal is not None
@@ -123,7 +123,7 @@ def test_nothing_is_sent_unless_the_mission_is_in_flight(make: Callable[[], Inav
 
 
 @pytest.mark.parametrize("held", [None, replace(RECORD, alt_cm=2001)])
-def test_nothing_is_sent_if_the_board_has_another_record_there(held: NavRecord | None) -> None:
+def test_does_not_send_anything_if_the_board_has_another_record_there(held: NavRecord | None) -> None:
     inav = Inav()
     refusal = run(inav, held=held)
     assert refusal is not None

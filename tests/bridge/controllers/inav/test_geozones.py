@@ -19,7 +19,7 @@ def judged(*items: MissionItem, former: tuple[Geozone, ...] = ()) -> Verdict[Geo
     return check_list(items, FenceRules(former))
 
 
-def test_corners_are_stored_anticlockwise_from_the_first_one() -> None:
+def test_corners_are_stored_anticlockwise_from_the_first() -> None:
     corners = [Corner(453838000 + 100 * north, 84733000 + 100 * east) for north, east in (A, B, C)]
     for order in ((A, B, C), (A, C, B)):
         (zone,) = judged(*polygon(Command.FENCE_POLYGON_EXCLUSION, *order)).records

@@ -75,7 +75,7 @@ def test_what_a_rover_or_boat_flies_otherwise_is_named(platform: Platform) -> No
     ]
 
 
-def test_a_far_or_high_flight_is_named_although_inav_has_no_limit() -> None:
+def test_a_far_or_high_flight_is_named_although_inav_does_not_have_a_limit() -> None:
     far = replace(WP, lat_e7=LAT + 60 * NORTH, alt_m=200.0)
     assert texts(NEAR, far, RTL_LANDS) == [
         "WP 2: 5.9 km leg, over 2 km (+1)",
@@ -205,7 +205,7 @@ def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str)
         ),
     ],
 )
-def test_how_an_aeroplane_lands_after_its_return_is_named(
+def test_how_an_aeroplane_lands_after_the_return_is_named(
     safehome: Safehome | None, limits: dict[str, Any], news: list[str]
 ) -> None:
     limits = {"safehomes": (safehome,) if safehome else (), **limits}
@@ -214,7 +214,7 @@ def test_how_an_aeroplane_lands_after_its_return_is_named(
     assert not any("FW" in text for text in texts(WP, RTL, platform=Platform.AEROPLANE, **limits))
 
 
-def test_an_aeroplanes_approach_is_read_and_its_mission_loaded_because_only_then_inav_uses_it() -> None:
+def test_an_aeroplanes_approach_is_read_and_the_mission_loaded_because_only_then_inav_uses_it() -> None:
     board, world, station = board_with(version="9.0.1", platform=1)
     firmware = board._firmware
     approach = struct.pack("<BiiBhhB", MISSION_APPROACH, 4000, 0, 0, -90, 0, 0)

@@ -104,7 +104,7 @@ def test_a_multiwii_holds_the_items_it_supports() -> None:
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_nothing_is_changed_while_armed(version: str) -> None:
+def test_does_not_change_anything_while_armed(version: str) -> None:
     board, world, station = board_with(version=version)
     assert Upload(station, plan(10)).run() is ACCEPTED
     before = board.stored_records
@@ -119,7 +119,7 @@ def test_nothing_is_changed_while_armed(version: str) -> None:
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.2, 0.5, 0.7, 0.75, 0.8, 0.85])
-def test_arming_at_any_moment_flies_no_half_list(moment: float) -> None:
+def test_arming_at_any_moment_does_not_fly_a_half_list(moment: float) -> None:
     board, world, station = board_with()
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))
@@ -149,7 +149,7 @@ def test_damaged_bytes_set_off_no_hazard(seed: int) -> None:
     assert (result is ACCEPTED) <= (read == without_home(plan(40, seed)))
 
 
-def test_a_transfer_takes_little_more_than_its_time_on_the_wire() -> None:
+def test_a_transfer_takes_little_more_than_the_time_on_the_wire() -> None:
     """Apart from the time until the board reads its port."""
     board, world, station = board_with(eeprom_write_ms=0.0, serial_task_ms=0.1)
     upload = Upload(station, plan(121))
@@ -244,7 +244,7 @@ def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
 
 
 @pytest.mark.parametrize("size", [21, 100, 192])
-def test_an_unfinished_frame_in_its_parser_does_not_hide_the_board(size: int) -> None:
+def test_an_unfinished_frame_in_the_parser_does_not_hide_the_board(size: int) -> None:
     """The parser has no timeout: it reads the bridge's requests as the rest of the frame."""
     board = make_board("inav", MspOptions())
     world = World(speeds=(115200,), peer=board, plugged=False)

@@ -147,7 +147,7 @@ def test_an_armed_craft_is_read_but_not_changed() -> None:
     assert read(station, RALLY) == numbered(RALLY_ITEMS)
 
 
-def test_a_lost_reply_to_a_corner_leaves_no_corner_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lost_reply_to_a_corner_does_not_leave_a_corner_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     """INAV would keep it twice, and turn all zones off."""
     board, _, station = board_with()
     firmware = board._firmware
@@ -236,7 +236,7 @@ def test_unchanged_safehomes_keep_their_number_and_so_their_landing_approach() -
     assert [answer[1] for answer in stored if answer] == [0, 1, 1]
 
 
-def test_a_new_world_has_no_fence() -> None:
+def test_a_new_world_does_not_have_a_fence() -> None:
     """Before a board is found, and on one without missions."""
     station = GroundStation(World(peer=make_board("betaflight", faults=Faults(boxes=0)), speeds=(115200,)))
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is MissionResult.UNSUPPORTED

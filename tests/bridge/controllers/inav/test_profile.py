@@ -15,7 +15,7 @@ from tests.support.fake_inav import FakeInav, FakeMultiwii
 @pytest.mark.parametrize(
     ("make", "kind", "capacity"), [(FakeInav, inav.PROFILE, 120), (FakeMultiwii, multiwii.PROFILE, 60)]
 )
-def test_the_board_is_recognised_by_its_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
+def test_the_board_is_recognised_by_the_answers(make: Callable[[], FakeInav], kind: Profile, capacity: int) -> None:
     world, _ = found(make())
     assert world.kind is kind
     assert world.inside.session.state.controller is not None

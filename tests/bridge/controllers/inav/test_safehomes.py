@@ -42,7 +42,7 @@ def test_safehomes_that_are_off_are_named_when_they_are_erased() -> None:
         (read_approaches(range(8)), MspFrame(Direction.REPLY, FW_APPROACH, struct.pack("<BiiBhhB", 200, *6 * (0,)))),
     ],
 )
-def test_a_reply_about_another_place_is_no_answer(reading: Conversation[object], reply: MspFrame) -> None:
+def test_a_reply_about_another_place_is_not_an_answer(reading: Conversation[object], reply: MspFrame) -> None:
     next(reading)
     with pytest.raises(StopIteration) as ended:
         reading.send(reply)

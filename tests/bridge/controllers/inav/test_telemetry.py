@@ -113,7 +113,7 @@ def test_load_battery_percentage_and_cells_come_from_the_board() -> None:
 
 
 @pytest.mark.parametrize("unix_s", [0.0, 1_777_636_800.0])
-def test_the_boards_time_is_known_once_its_gps_has_it(unix_s: float) -> None:
+def test_the_boards_time_is_known_once_the_gps_has_it(unix_s: float) -> None:
     _, world, _ = introduced(unix_s=unix_s)
     time = world.bridge.vehicle.last(GpsTime)
     assert (time is not None) == bool(unix_s)

@@ -111,7 +111,7 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
 
 
-def test_without_an_action_a_zone_stops_nothing() -> None:
+def test_without_an_action_a_zone_does_not_stop_anything() -> None:
     assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: flown, no action is set"]
     assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 2: geozone 0: flown, or a return if ANGLE is on"]
 

@@ -144,7 +144,7 @@ def test_home_is_not_a_record() -> None:
 # -- flown differently than it reads ---------------------------------------------------------------------------
 
 
-def test_an_rtl_as_first_item_leaves_nothing_to_fly() -> None:
+def test_an_rtl_as_first_item_does_not_leave_anything_to_fly() -> None:
     assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
 
 

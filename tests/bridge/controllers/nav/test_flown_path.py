@@ -33,7 +33,7 @@ def test_records_behind_an_rth_count_only_if_a_jump_leads_there(records: list[Na
     [(RTH, False), (RTH_LANDS, True), (WP, False), (NavRecord(NavAction.WAYPOINT, p1=300), True), (jump(1), False),
      (jump(2), True)],
 )  # fmt: skip
-def test_the_last_record_decides_the_landing_whatever_its_action(last: NavRecord, lands: bool) -> None:
+def test_the_last_record_decides_the_landing_regardless_of_the_action(last: NavRecord, lands: bool) -> None:
     assert lands_after_rth([RTH_LANDS, WP, last]) is lands
 
 

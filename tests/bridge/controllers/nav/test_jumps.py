@@ -71,7 +71,7 @@ def test_a_jump_that_blocks_arming_or_crashes_inav_rejects_the_list(items: tuple
     assert verdict.findings[-1].becomes == REJECTED
 
 
-def test_a_jump_to_the_first_record_as_the_last_one_means_hover() -> None:
+def test_a_jump_to_the_first_record_as_the_last_means_hover() -> None:
     """INAV stores the target as an index, 0."""
     assert verdict_on(WP, jump(5), WP, RTL, WP, WP, jump(1)).result is Result.ACCEPTED
     assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, jump(1)).result is Result.REJECTED

@@ -156,7 +156,7 @@ def test_one_lost_frame_costs_less_than_two_seconds(loss: str) -> None:
         assert outcome[0][0].ack is ACCEPTED
 
 
-def test_nothing_is_sent_while_armed() -> None:
+def test_does_not_send_anything_while_armed() -> None:
     inav = FakeInav()
     world, station = found(inav)
     inav.armed = True
@@ -272,7 +272,7 @@ def test_the_current_item_and_reached_items_are_reported() -> None:
     assert all(m.total == 5 for m in received if m.get_type() == "MISSION_CURRENT" and m.seq)
 
 
-def test_a_frame_that_may_have_lost_its_header_is_followed_by_a_harmless_one() -> None:
+def test_a_frame_that_may_have_lost_the_header_is_followed_by_a_harmless_one() -> None:
     """INAV opens its CLI on a '#' outside a frame followed by 100 ms of silence, and then no longer answers MSP."""
     for lost in range(1, 12):
         inav = FakeInav()

@@ -63,7 +63,7 @@ def test_megabytes_of_noise_give_no_verdict(name: str) -> None:
 
 
 @pytest.mark.parametrize("preamble", [b"$M>", b"$M!", b"$M<", b"\xfe", b"\xfd", b"\xfe\x09", b"\xfd\x09\x00"])
-def test_noise_full_of_frame_headers_gives_no_verdict(preamble: bytes) -> None:
+def test_noise_full_of_frame_headers_does_not_give_a_verdict(preamble: bytes) -> None:
     draw = random.Random(preamble)
     noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(60_000))
     listen(noise, begin(*SPEEDS), 200)

@@ -134,7 +134,7 @@ def test_it_is_found_again_after_unplugging(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BOARDS)
-def test_a_board_in_its_cli_is_probed_every_three_seconds(kind: str) -> None:
+def test_a_board_in_the_cli_is_probed_every_three_seconds(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
     world.wait_until(is_in_cli, 2)
     began = world.now
@@ -144,7 +144,7 @@ def test_a_board_in_its_cli_is_probed_every_three_seconds(kind: str) -> None:
     assert_nothing_was_typed(world, 0)
 
 
-def test_nothing_is_sent_while_a_person_types() -> None:
+def test_does_not_send_anything_while_a_person_types() -> None:
     world = left_in_cli(BOARDS["testcode3"]())
     world.wait_until(is_in_cli, 2)
     world.run(1)

@@ -34,7 +34,7 @@ def test_msp_is_used_again_once_the_board_answers_it() -> None:
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.3, 0.6, 0.9])
-def test_a_deaf_board_is_recognised_by_its_frsky_telemetry(after_s: float) -> None:
+def test_a_deaf_board_is_recognised_by_the_frsky_telemetry(after_s: float) -> None:
     faults = Faults()
     world = World(
         faults=faults, peer=SwitchedReceiver(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600), faults, is_deaf=True)

@@ -101,7 +101,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent(board: type[Simulat
     world.assert_line_was_clean()
 
 
-def test_a_board_met_over_msp_keeps_its_family_whatever_its_ids() -> None:
+def test_a_board_met_over_msp_keeps_the_family_regardless_of_the_ids() -> None:
     """A Harakiri with changed ids: to pass frames on to it could reset it."""
     world = ready_world()
     world.naze = MavlinkOnly(1)

@@ -19,7 +19,7 @@ def heartbeat(sender: tuple[int, int], version: int, autopilot: int = 3) -> byte
 
 
 @pytest.mark.parametrize("kind", [3, 8], ids=["autopilot", "sensor"])
-def test_a_second_component_beside_an_autopilot_changes_nothing(kind: int) -> None:
+def test_a_second_component_beside_an_autopilot_does_not_change_anything(kind: int) -> None:
     """Component 200 is also MAVLink's id of a gyro. The autopilot's own heartbeats come less often."""
     world = World(peer=Autopilot(), speeds=(115200,))
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 5)
@@ -30,7 +30,7 @@ def test_a_second_component_beside_an_autopilot_changes_nothing(kind: int) -> No
     assert world.events("fc.lost") == []
 
 
-def test_a_sensor_that_outlives_its_autopilot_is_not_a_harakiri() -> None:
+def test_a_sensor_that_outlives_the_autopilot_is_not_a_harakiri() -> None:
     autopilot = Autopilot()
     world = World(peer=autopilot, speeds=(115200,))
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 5)

@@ -125,7 +125,7 @@ def test_a_request_to_every_system_reaches_an_autopilot_that_was_heard_once(acce
     assert autopilot.sent == []
 
 
-def test_the_bridge_sends_no_messages_of_its_own() -> None:
+def test_the_bridge_does_not_send_messages_of_its_own() -> None:
     world, autopilot, (station, _) = passing()
     world.run(20)
     assert station.frames == autopilot.sent
@@ -169,7 +169,7 @@ def test_only_a_frame_with_a_target_asks_for_a_reply() -> None:
     assert asks == [False, True]
 
 
-def test_an_addressed_frame_goes_only_to_its_target() -> None:
+def test_an_addressed_frame_goes_only_to_the_target() -> None:
     world, autopilot, (one, other) = passing()
     autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
     autopilot.send(mavlink.MAVLink_mission_ack_message(254, 0, 0, 0))
@@ -188,7 +188,7 @@ def test_ground_stations_reach_each_other() -> None:
     assert bytes(autopilot.received) == b""
 
 
-def test_a_silent_station_gets_no_more_frames() -> None:
+def test_a_silent_station_does_not_get_more_frames() -> None:
     world, _autopilot, (one, other) = passing()
 
     def send() -> None:
@@ -261,7 +261,7 @@ def test_after_an_autopilot_is_unplugged_the_bridge_represents_its_own_vehicle()
     assert station.frames == autopilot.sent != []
 
 
-def test_a_board_in_its_command_line_in_place_of_an_autopilot_is_reported() -> None:
+def test_a_board_in_the_command_line_in_place_of_an_autopilot_is_reported() -> None:
     world, _autopilot, (station, _) = passing()
     world.unplug()
     world.naze = SimulatedNaze()
@@ -278,7 +278,7 @@ def test_frames_are_split_as_in_pymavlink() -> None:
     assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
 
 
-def test_a_false_header_in_a_slow_stream_delays_no_frame() -> None:
+def test_a_false_header_in_a_slow_stream_does_not_delay_a_frame() -> None:
     """The false frame has room for twelve heartbeats."""
     world, autopilot, (station, _) = passing()
     autopilot.outgoing += b"\xfd\xff\x00\x00\x00\x01\x01\x1e\x00\x00"
@@ -323,7 +323,7 @@ def test_addresses_heard_once_do_not_multiply_frames() -> None:
     assert len(ground.peers()) == 2
 
 
-def test_an_address_that_is_used_again_gets_nothing_for_its_earlier_ids() -> None:
+def test_an_address_that_is_used_again_does_not_get_anything_for_the_earlier_ids() -> None:
     world, autopilot, (one, _) = passing()
     world.bridge.gcs_gone(one.peer, world.now)
     successor = GroundStation(world, "gcs0", sysid=7)

@@ -22,7 +22,7 @@ def test_a_silent_flight_controller_is_a_problem() -> None:
     assert_note(found, "/dev/serial0 cannot be opened yet")
 
 
-def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
+def test_a_flight_controller_in_the_command_line_is_recognised() -> None:
     (_, found) = check_flight_controller(PORT, STATUS | {"flight_controller": None, "state": Cli.name}, None)
     assert_problem(found, Cli.trouble.text, "naze-bridge doctor` again")
 
@@ -32,7 +32,7 @@ def test_a_flight_controller_in_its_command_line_is_recognised() -> None:
     assert_problem(check_flight_controller(PORT, None, listened), Cli.trouble.text, "naze-bridge doctor` again")
 
 
-def test_a_daemon_is_asked_and_the_port_left_alone() -> None:
+def test_a_daemon_is_asked_and_the_port_not_touched() -> None:
     (daemon, found) = check_flight_controller(PORT, STATUS, no_answer)
     assert_ok(daemon, "running")
     assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")

@@ -88,6 +88,6 @@ def test_undervoltage_now_and_since_the_start() -> None:
     assert_ok(check_power(lambda *_: "throttled=0x0\n"), "no undervoltage since the start")
 
 
-def test_another_machine_has_no_such_check() -> None:
+def test_another_machine_does_not_have_this_check() -> None:
     assert check_power(lambda *_: "") is None
     assert check_power(lambda *_: "VCHI initialization failed") is None

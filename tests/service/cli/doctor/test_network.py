@@ -52,7 +52,7 @@ def test_a_network_port_used_by_our_daemon_is_fine(pi: FaultyMachine) -> None:
     assert_ok(ports(pi, is_running=True), "the running daemon's")
 
 
-def test_a_running_daemon_without_its_port_is_a_problem(pi: FaultyMachine) -> None:
+def test_a_running_daemon_without_the_port_is_a_problem(pi: FaultyMachine) -> None:
     assert_ok(ports(pi), "UDP port 14550 is free")
     assert_problem(ports(pi, is_running=True), "does not listen on UDP port 14550", "systemctl restart naze-bridge")
 
@@ -64,7 +64,7 @@ def test_the_ports_of_the_page_and_of_shares_are_checked(pi: FaultyMachine) -> N
     assert [each.found.rpartition("on ")[2] for each in found] == ["UDP port 14550", "TCP port 5761", "TCP port 8080"]
 
 
-def test_an_outgoing_connection_does_not_occupy_its_port(pi: FaultyMachine) -> None:
+def test_an_outgoing_connection_does_not_occupy_the_port(pi: FaultyMachine) -> None:
     pi.sockets(tcp=TCP_14550)
     assert_ok(ports(pi, "tcpin:0.0.0.0:14550"), "TCP port 14550 is free")
     pi.sockets(tcp=TCP_14550.replace(" 01 ", " 0A "))

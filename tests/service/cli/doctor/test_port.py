@@ -25,7 +25,7 @@ def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
 
 
-def test_setup_is_no_remedy_for_a_missing_uart_of_another_board(pi: FaultyMachine) -> None:
+def test_setup_is_not_a_remedy_for_a_missing_uart_of_another_board(pi: FaultyMachine) -> None:
     pi.write("/proc/device-tree/model", "Orange Pi 5\0")
     found = check_port(pi, SerialFc("/dev/ttyS4", None))
     assert_problem(found, "/dev/ttyS4 is missing", "enable this UART in the board's own boot settings")
@@ -118,7 +118,7 @@ def test_another_program_on_the_port_is_named(pi: FaultyMachine) -> None:
     assert_problem(check_holder(pi, PORT), "gpsd (pid 99) has /dev/ttyAMA0 open", "sudo kill 99")
 
 
-def test_a_daemon_on_the_port_is_fine_and_left_alone(pi: FaultyMachine, tmp_path: Path) -> None:
+def test_a_daemon_on_the_port_is_fine_and_not_touched(pi: FaultyMachine, tmp_path: Path) -> None:
     pi.runs(99, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="/dev/ttyAMA0")
     assert_ok(check_holder(pi, PORT), "the daemon has /dev/ttyAMA0 open")
 

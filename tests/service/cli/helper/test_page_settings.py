@@ -56,7 +56,7 @@ _WRONG: Mapping[str, Sequence[object]] = {
 
 
 @pytest.mark.parametrize("values", [{name: wrong} for name, values in _WRONG.items() for wrong in values])
-def test_a_value_that_is_no_choice_is_refused(pi: FixablePi, values: Json) -> None:
+def test_a_value_that_is_not_a_choice_is_refused(pi: FixablePi, values: Json) -> None:
     with pytest.raises(HelperRefusal, match="cannot have this value"):
         pi.ask("settings", values=values)
     assert not pi.path(_PAGE).exists()

@@ -35,7 +35,7 @@ def shown_key(done: Result) -> str:
     return str(key)
 
 
-def test_a_new_key_is_stored_for_the_service_and_shown_with_its_code(pi: Pi) -> None:
+def test_a_new_key_is_stored_for_the_service_and_shown_with_the_code(pi: Pi) -> None:
     done = pi.setup("--yes", "--new-key")
     key = shown_key(done)
     assert weakness(key) is None
@@ -62,7 +62,7 @@ def test_the_pilot_is_asked_once(pi: Pi) -> None:
     assert pi.key_file.read_text() == f"{first}\n"
 
 
-def test_a_new_key_replaces_the_present_one_and_the_service_takes_it(pi: Pi) -> None:
+def test_a_new_key_replaces_the_present_and_the_service_takes_it(pi: Pi) -> None:
     pi.is_running()
     first = shown_key(pi.setup("--yes", "--new-key"))
     pi.ran.clear()
@@ -71,7 +71,7 @@ def test_a_new_key_replaces_the_present_one_and_the_service_takes_it(pi: Pi) -> 
     assert pi.ran[-1] == "systemctl restart naze-bridge.service"
 
 
-def test_captured_output_has_no_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_captured_output_does_not_have_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sentences, "is_terminal", lambda: False)
     state, password = pi.root / "var/lib/naze-bridge", tmp_path / "password"
     state.mkdir(parents=True)
@@ -85,7 +85,7 @@ def test_captured_output_has_no_secrets(pi: Pi, tmp_path: Path, monkeypatch: pyt
     assert "Its token, for changes: in /var/lib/naze-bridge/web-token" in done.output
 
 
-def test_the_token_is_shown_with_its_code(pi: Pi) -> None:
+def test_the_token_is_shown_with_the_code(pi: Pi) -> None:
     root = ["token", "--root", str(pi.root)]
     assert "no token yet" in CliRunner().invoke(main, root).output
     (pi.root / "var/lib/naze-bridge").mkdir(parents=True)
@@ -95,7 +95,7 @@ def test_the_token_is_shown_with_its_code(pi: Pi) -> None:
     assert "▄" in shown
 
 
-def test_a_dry_run_shows_and_makes_no_key(pi: Pi) -> None:
+def test_a_dry_run_shows_and_does_not_make_a_key(pi: Pi) -> None:
     done = pi.setup("--dry-run", "--new-key")
     assert "set the key" in done.output
     assert not _SHOWN.findall(done.output)
@@ -149,7 +149,7 @@ def test_a_network_name_that_is_none_is_refused(name: str) -> None:
 @pytest.mark.parametrize(
     "text", [b"two\nlines\n", b" long-enough\n", b"long-enough \n", b"long\x1benough", b"\xff", b""]
 )
-def test_a_file_that_holds_no_single_line_is_refused(pi: Pi, tmp_path: Path, text: bytes) -> None:
+def test_a_file_that_does_not_hold_a_single_line_is_refused(pi: Pi, tmp_path: Path, text: bytes) -> None:
     (tmp_path / "password").write_bytes(text)
     assert pi.setup("--yes", "--hotspot", "kite", "--password-file", str(tmp_path / "password")).exit_code == 2
 

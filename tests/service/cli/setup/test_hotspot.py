@@ -205,7 +205,7 @@ def test_without_a_hotspot_no_phone_is_offered_the_page(tmp_path: Path) -> None:
     assert list(captive_steps(FaultyMachine(tmp_path / "other"), None, has_page=True)) == []
 
 
-def test_the_clients_of_another_shared_connection_are_left_alone(pi: FaultyMachine) -> None:
+def test_the_clients_of_another_shared_connection_are_not_touched(pi: FaultyMachine) -> None:
     """Its name server reads the same settings as the hotspot's."""
     pi.write("/etc/NetworkManager/system-connections/cable.nmconnection", "[ipv4]\nmethod=shared\n")
     assert list(captive_steps(pi, None, has_page=True)) == []

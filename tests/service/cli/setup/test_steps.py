@@ -99,7 +99,7 @@ def test_a_fresh_card_is_set_up_in_one_run(tmp_path: Path, model: str) -> None:
 
 
 @pytest.mark.parametrize(("serial0", "config"), [("ttyAMA10", "[all]\nenable_uart=1\n"), ("ttyAMA0", "[all]\n")])
-def test_a_pi_5_whose_serial0_is_the_header_loses_its_console(tmp_path: Path, serial0: str, config: str) -> None:
+def test_a_pi_5_whose_serial0_is_the_header_loses_the_console(tmp_path: Path, serial0: str, config: str) -> None:
     """Its bootloaders since 2025-02-12 do that for enable_uart=1, which Ubuntu sets, and a card used in a Pi 4."""
     pi = FreshPi(tmp_path, "5")
     pi.path("/dev/serial0").unlink()
@@ -142,7 +142,7 @@ def test_the_last_entry_for_all_models_in_config_txt_counts(tmp_path: Path, give
     assert ("enable the UART on the header" not in purposes) is is_on
 
 
-def test_setup_of_an_image_for_every_model_starts_nothing(tmp_path: Path) -> None:
+def test_setup_of_an_image_for_every_model_does_not_start_anything(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.path("/proc/device-tree/model").unlink()
     pi.path("/run/systemd/system/.keep").unlink()
@@ -169,7 +169,7 @@ def test_setup_of_an_image_for_every_model_starts_nothing(tmp_path: Path) -> Non
         (["--fc", "naze"], "is not a flight controller connection"),
     ],
 )
-def test_an_invalid_answer_is_one_sentence(tmp_path: Path, options: list[str], words: str) -> None:
+def test_an_invalid_answer_is_reported_in_one_sentence(tmp_path: Path, options: list[str], words: str) -> None:
     file = tmp_path / "password"
     file.write_text("long-enough\n")
     ended = run_naze_bridge("setup", "--yes", "--root", tmp_path, *(option.format(file) for option in options))
