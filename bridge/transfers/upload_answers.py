@@ -76,8 +76,8 @@ class UploadAnswers:
         accepted = delivery.ack is MissionResult.ACCEPTED
         if verdict.result is Result.ACCEPTED and not sender.station.has_written:
             sender.station.has_written = True
-            if self.are_only_missions_stored:
-                # QGroundControl silently leaves out lists that the vehicle does not offer to store.
+            if self.are_only_missions_stored and sender.station.behaviour.kind is Kind.QGROUNDCONTROL:
+                # It silently leaves out lists that the vehicle does not offer to store.
                 sender.say(sentences.ONLY_MISSIONS())
         for line in finding_lines(verdict.findings) if accepted else ():
             if line.text != delivery.text:

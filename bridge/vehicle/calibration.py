@@ -9,7 +9,7 @@ calibration and then restarts. A Harakiri does nothing else meanwhile, so its si
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from math import inf
 
@@ -34,6 +34,8 @@ from protocols.rights.msp import msp_right
 _TICK_S = 1.0
 #: Mission Planner waits 25 s for the next COMMAND_ACK.
 _ACK_INTERVAL_S = 5.0
+#: The result is acknowledged this often: two loops of Mission Planner read the link, and only one of them waits for it.
+_RESULT_ACKS, _RESULT_AGAIN_S = 6, 0.3
 #: Boards that stay reachable: MultiWii and its descendants collect compass values for 30 s, and accelerometer values
 #: for up to 2 s.
 _COMPASS_S, _ACCELEROMETER_S = 31.0, 4.0
@@ -112,9 +114,11 @@ class Calibration:
     _restarts: bool = False
     _began_at: float = 0.0
     _acknowledge_at: float = 0.0
+    _result_acks: list[CommandResult] = field(default_factory=list)
 
     def take(self, sender: Sender, command: int, action: FcAction, now: float) -> None:
         """Execute a command of a ground station, and acknowledge it."""
+        self._result_acks.clear()
         if action in (self._asked_for, self._action):
             # Repeated by the user or duplicated by the network.
             self._acknowledge(sender, command, CommandResult.IN_PROGRESS)
@@ -179,6 +183,9 @@ class Calibration:
 
     def tick(self, now: float) -> None:
         """Report a running calibration, and end it when its time has passed."""
+        if self._action is None:
+            self._acknowledge_result(now)
+            return
         lasts_s = _LONGEST_S if self._restarts else self._usual_s
         if now >= self._began_at + lasts_s:
             self._conclude(now)
@@ -233,9 +240,14 @@ class Calibration:
                 self._send_progress(now, 100)
             self._send_report(m.MAG_CAL_FAILED if failure else m.MAG_CAL_SUCCESS)
         else:
-            result = CommandResult.FAILED if failure else CommandResult.ACCEPTED
-            self._acknowledge(self._sender, self._command, result)
+            self._result_acks = [CommandResult.FAILED if failure else CommandResult.ACCEPTED] * _RESULT_ACKS
+            self._acknowledge_result(now)
         self._action = None
+
+    def _acknowledge_result(self, now: float) -> None:
+        self.due = now + _RESULT_AGAIN_S if self._result_acks else inf
+        if self._result_acks:
+            self._acknowledge(self._sender, self._command, self._result_acks.pop())
 
     def _send_progress(self, now: float, percent: int | None = None) -> None:
         """MAG_CAL_PROGRESS: the part of the usual time."""

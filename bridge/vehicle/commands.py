@@ -56,20 +56,10 @@ _REFUSED: Mapping[int, Sentence[()]] = {
     messages.MAV_CMD_DO_SET_HOME: sentences.HOME,
     messages.MAV_CMD_NAV_WAYPOINT: sentences.FLY,
     messages.MAV_CMD_NAV_LOITER_UNLIM: sentences.FLY,
-    messages.MAV_CMD_CONDITION_YAW: sentences.FLY,
     messages.MAV_CMD_DO_REPOSITION: sentences.FLY,
-    messages.MAV_CMD_DO_CHANGE_ALTITUDE: sentences.FLY,
-    messages.MAV_CMD_OVERRIDE_GOTO: sentences.FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_SPEED: sentences.FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_ALTITUDE: sentences.FLY,
-    messages.MAV_CMD_GUIDED_CHANGE_HEADING: sentences.FLY,
+    messages.MAV_CMD_DO_DIGICAM_CONTROL: sentences.NO_CAMERA,
     messages.MAV_CMD_DO_FLIGHTTERMINATION: sentences.OUTPUTS,
-    messages.MAV_CMD_DO_MOTOR_TEST: sentences.OUTPUTS,
     messages.MAV_CMD_DO_SET_SERVO: sentences.OUTPUTS,
-    messages.MAV_CMD_DO_REPEAT_SERVO: sentences.OUTPUTS,
-    messages.MAV_CMD_DO_SET_RELAY: sentences.OUTPUTS,
-    messages.MAV_CMD_DO_REPEAT_RELAY: sentences.OUTPUTS,
-    messages.MAV_CMD_DO_JUMP_TAG: sentences.NOT_SET_TO_ITEM,
     messages.MAV_CMD_DO_FENCE_ENABLE: sentences.NO_FENCE,
 }
 #: A ground station itself asks for these, and no pilot waits for the answer.
@@ -139,9 +129,11 @@ class CommandService:
             sender.say(refusal.why)
             self._vehicle.refuse_current(sender, now)
 
-    def refuse(self, sender: Sender, command: int, custom_mode: float = -1) -> None:
-        """Give the reason for refusing a command, or a message that does the same but is not acknowledged."""
-        is_auto = command == messages.MAV_CMD_DO_SET_MODE and custom_mode == auto_mode(self._session.vehicle)
+    def refuse(self, sender: Sender, command: int, mode: Sequence[float] = (0, -1)) -> None:
+        """Give the reason for refusing a command, or a message like it. `mode`: base_mode and custom_mode."""
+        if command == messages.MAV_CMD_DO_SET_MODE and mode[0] == messages.MAV_MODE_FLAG_SAFETY_ARMED:
+            command = messages.MAV_CMD_COMPONENT_ARM_DISARM  # Mission Planner's "Toggle Safety Switch"
+        is_auto = command == messages.MAV_CMD_DO_SET_MODE and mode[1] == auto_mode(self._session.vehicle)
         of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
         if not self._vehicle.readiness.has_board:
             sender.say(sentences.NO_BOARD_TO_COMMAND())
@@ -186,13 +178,11 @@ class CommandService:
             case messages.MAV_CMD_RUN_PREARM_CHECKS:
                 self._vehicle.readiness.tell(sender.station)
                 return CommandResult.ACCEPTED
-            case messages.MAV_CMD_DO_ACCEPT_MAG_CAL:
-                return CommandResult.ACCEPTED  # it is stored already
             case messages.MAV_CMD_DO_CANCEL_MAG_CAL if self._calibration.is_endless:
                 sender.say(sentences.NOT_CANCELLED())
                 return CommandResult.DENIED
-            case messages.MAV_CMD_DO_CANCEL_MAG_CAL:
-                # QGroundControl also asks in this way if there is such a calibration.
+            case messages.MAV_CMD_DO_ACCEPT_MAG_CAL | messages.MAV_CMD_DO_CANCEL_MAG_CAL:
+                # It is stored already. QGroundControl asks by a cancel if there is such a calibration.
                 return CommandResult.ACCEPTED
             case messages.MAV_CMD_PREFLIGHT_CALIBRATION if _asked(params) in _CALIBRATED_AT_START:
                 sender.say(sentences.CALIBRATED_AT_START())
@@ -200,7 +190,7 @@ class CommandService:
         if command in _ASKS_FOR:
             return self._send_once(sender, _ASKS_FOR[command], now)
         if command in _REFUSED:
-            self.refuse(sender, command, params[1])
+            self.refuse(sender, command, params)
             return CommandResult.DENIED
         name = command_name(command)
         if not (name.isdigit() or name.startswith(_ASKED_BY_PROGRAMS)):

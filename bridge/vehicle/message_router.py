@@ -101,7 +101,9 @@ class MessageRouter:
             ),
             m.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._data_stream,
-            m.MAVLINK_MSG_ID_SET_MODE: lambda s, msg, _: commands.refuse(s, m.MAV_CMD_DO_SET_MODE, msg.custom_mode),
+            m.MAVLINK_MSG_ID_SET_MODE: lambda s, msg, _: commands.refuse(
+                s, m.MAV_CMD_DO_SET_MODE, (msg.base_mode, msg.custom_mode)
+            ),
             m.MAVLINK_MSG_ID_AUTOPILOT_VERSION_REQUEST: lambda s, _msg, now: vehicle.send_once(
                 s, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now
             ),

@@ -20,7 +20,7 @@ from bridge.model.missions import FlightReport, FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.vehicle import vehicle_messages as make
 from bridge.vehicle.nav_words import NavWords, sentence_for
-from bridge.vehicle.readiness import CraftReadiness
+from bridge.vehicle.readiness import CraftReadiness, ReadyState
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
 from bridge.voice import sentences
@@ -128,7 +128,7 @@ class OwnVehicle:
         self.readiness.follow(now)
         self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
-        if self._session.vehicle.fresh(Health, now, _SILENT_S) is None:
+        if self.readiness.state is ReadyState.CALIBRATING or not self._session.vehicle.fresh(Health, now, _SILENT_S):
             # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
             self._send_due([(_SYS_STATUS, None), (_EXTENDED_SYS_STATE, None)], now)
         self._announce_home(now)

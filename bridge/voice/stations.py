@@ -74,7 +74,8 @@ def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
     """The texts for a kind of station, with their severities. On a HUD only the last stays."""
     sentence, severity, whole = happening.sentence, happening.severity, happening.text
     if kind is Kind.MISSION_PLANNER and sentence.planner:
-        return [(severity, sentence.planner)]
+        # Its HUD would show a PreArm text of a lower severity in red, like an emergency.
+        return [(Severity.WARNING, sentence.planner)]
     if severity > Severity.WARNING:
         return [(severity, whole)]
     if kind is Kind.QGROUNDCONTROL and severity is Severity.ERROR:

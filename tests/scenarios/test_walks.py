@@ -30,7 +30,7 @@ from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 CEILINGS = {
     "attitude": Walk(calls=40, returns=12, files=18),
     "item": Walk(calls=57, returns=23, files=16),
-    "ack": Walk(calls=432, returns=227, files=43),
+    "ack": Walk(calls=413, returns=213, files=43),
     "setting": Walk(calls=265, returns=108, files=51),
     "arming": Walk(calls=66, returns=18, files=26),
 }

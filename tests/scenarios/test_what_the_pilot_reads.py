@@ -23,6 +23,7 @@ from simulator.inav.boxes import BOXES as INAV_BOXES
 from tests.bridge.controllers.inav.test_approaches import set_approaches
 from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS
 from tests.support.conversations import Upload, ack_message, clear_message, count_message, item_message, waypoints
+from tests.support.qgc_upload import QGC_HEARTBEAT
 from tests.support.screens import Glance, Screens
 from tests.support.world import GroundStation, World
 
@@ -433,8 +434,10 @@ def test_a_deleted_rally_points_landing_approach_is_read_in_full() -> None:
     assert screens.mission_planner.texts(began)[-1] == screens.glance().hud == summary
 
 
-def test_once_after_the_first_write_a_station_hears_that_only_missions_are_stored() -> None:
+def test_once_after_the_first_write_qgroundcontrol_hears_that_only_missions_are_stored() -> None:
+    """It leaves out the others silently; Mission Planner asks, and gets the refusal."""
     world, station, screens = on_the_ground()
+    station.send(QGC_HEARTBEAT)
     for _ in range(2):
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
         world.run(5.0)

@@ -776,7 +776,6 @@ def test_the_summary_comes_last_and_goes_only_to_the_writer() -> None:
     world.run(0.1)
     texts = [(text.severity, text.text) for text in station.messages("STATUSTEXT") if "naze" not in text.text]
     assert texts == [
-        (6, "Fences and rally points are not stored here"),
         (5, "20 items: DO_CHANGE_SPEED dropped, not supported"),
         (5, "WP 30: Alt flown above home, not above sea level"),
         (4, "20 of 40 stored: 20 dropped, 1 Alt now relative"),

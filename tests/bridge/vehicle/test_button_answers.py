@@ -71,6 +71,26 @@ def test_a_refused_command_is_not_a_banner_beside_the_dialog_of_qgroundcontrol()
     assert (screen.banners, screen.heard(began)[0]) == ([], "Arm and disarm with the transmitter")
 
 
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (m.MAV_CMD_DO_DIGICAM_CONTROL, CAMERA),
+        # "Toggle Safety Switch": base_mode is SAFETY_ARMED, without a mode.
+        (m.MAV_CMD_DO_SET_MODE, "Arm and disarm with the transmitter"),
+    ],
+    ids=["trigger", "safety"],
+)
+def test_both_messages_of_a_button_of_mission_planner_have_the_same_answer(number: int, text: str) -> None:
+    world, station = connected()
+    station.send(m.MAVLink_command_long_message(1, 1, number, 0, 128, 1, 0, 0, 0, 0, 0))
+    if number == m.MAV_CMD_DO_SET_MODE:
+        station.send(m.MAVLink_set_mode_message(1, 128, 1))
+    elif number == m.MAV_CMD_DO_DIGICAM_CONTROL:
+        station.send(m.MAVLink_digicam_control_message(1, 1, 0, 0, 0, 0, 1, 0, 0, 0))
+    world.run(0.5)
+    assert station.texts() == [text]
+
+
 @pytest.mark.parametrize("number", [519, 521, 525, 2504])
 def test_requests_of_the_program_itself_do_not_get_a_text(number: int) -> None:
     world, station = connected()

@@ -158,11 +158,19 @@ def test_the_accelerometer_page_ends_with_success_after_the_restart(kind: int) -
     assert pages.wizard_result == ""
     pages.world.run(21)
     assert pages.wizard_result == "Accel calibration successful"
-    *running, final = pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION)
-    assert set(running) == {IN_PROGRESS}
-    assert final == ACCEPTED
+    acks = pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION)
+    # Another loop of Mission Planner may take an acknowledgement from the loop that waits for it.
+    assert list(dict.fromkeys(acks)) == [IN_PROGRESS, ACCEPTED]
+    assert acks.count(ACCEPTED) == 6
     assert pages.longest_wait_for_ack_s(m.MAV_CMD_PREFLIGHT_CALIBRATION) < ACK_TIMEOUT_S
     pages.assert_nothing_was_lost()
+
+
+def test_mission_planner_sees_at_once_that_a_calibrating_craft_is_not_ready() -> None:
+    pages = CalibrationPages()
+    pages.start_accelerometer(WIZARD)
+    pages.world.run(2)
+    assert not pages.screens.mission_planner.ready.at(pages.world.now)
 
 
 def test_a_tilted_craft_fails_the_accelerometer_calibration() -> None:
@@ -193,7 +201,14 @@ def test_a_multiwii_calibrates_while_it_answers() -> None:
     pages.start_accelerometer(SIMPLE)
     pages.world.run(8)
     assert pages.wizard_result == "Accel calibration successful"
-    assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [IN_PROGRESS, ACCEPTED]
+    assert set(pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION)) == {IN_PROGRESS, ACCEPTED}
+    # The next button is not answered by the result of the last.
+    pages.start_accelerometer(LEVEL)
+    pages.world.run(6)
+    pages.station.take()
+    pages.start_accelerometer(SIMPLE)
+    pages.world.run(2)
+    assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [IN_PROGRESS]
 
 
 def test_the_usual_time_counts_from_the_boards_reply() -> None:

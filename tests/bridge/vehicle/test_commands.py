@@ -117,8 +117,7 @@ def test_all_command_numbers_are_acknowledged() -> None:
         (21, "transmitter"),
         (20, "transmitter"),
         (224, "flies no missions"),
-        (601, "Set WP"),  # jump tag
-        (181, "cannot be driven"),  # relay
+        (183, "cannot be driven"),  # servo
         (207, "no fence"),
     ],
 )
