@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Debian package: `make deb`, or `python -m deb.build amd64 arm64 armhf` in the project's folder.
+"""Builds the Debian packages: `make deb`, or `python -m deb.build amd64 arm64 armhf` in the project's folder.
+
+naze-bridge-sim has the simulators, which a pilot's Pi does not need.
 
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
 side; pip fetches them for any architecture on any machine, and nothing is compiled. The target does not need a network.
@@ -41,7 +43,10 @@ _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux20
 
 
 def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST, compression: str = "xz") -> Path:
-    """Build the package in `folder`; returns the path. `compression` is dpkg-deb's."""
+    """Build naze-bridge, and naze-bridge-sim next to it, in `folder`; returns the path of the first.
+
+    `compression` is dpkg-deb's.
+    """
     work = _WORK / architecture
     shutil.rmtree(work, ignore_errors=True)
     wheels = work / "wheels"
@@ -56,10 +61,11 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
         _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, f"naze-bridge=={version}")
     root = work / "root"
-    lay_out(root, libraries, _PROJECT, debian_version(version), architecture)
+    lay_out(root, work / "sim", libraries, _PROJECT, debian_version(version), architecture)
     folder.mkdir(exist_ok=True)
     package = folder / f"naze-bridge_{debian_version(version)}_{architecture}.deb"
-    _run("dpkg-deb", "--root-owner-group", f"-Z{compression}", "--build", root, package)
+    for tree, file in ((root, package), (work / "sim", folder / f"naze-bridge-sim_{debian_version(version)}_all.deb")):
+        _run("dpkg-deb", "--root-owner-group", f"-Z{compression}", "--build", tree, file)
     return package
 
 

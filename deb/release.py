@@ -51,6 +51,7 @@ def release(version: str, architectures: tuple[str, ...] = _ARCHITECTURES) -> Pa
     folder = _PROJECT / "dist" / version
     folder.mkdir(parents=True, exist_ok=True)
     files = [*build_python(folder), *(build(each, folder=folder) for each in architectures)]
+    files += folder.glob("naze-bridge-sim_*.deb")
     for package in files:
         if package.suffix == ".deb":
             sign_package(package)

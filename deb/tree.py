@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of the package, and their places."""
+"""The files of the packages, and their places."""
 
 import filecmp
 import gzip
@@ -29,12 +29,15 @@ _UNITS = (
     *("naze-bridge-captive.socket", "naze-bridge-captive.service"),
 )
 _SCHEMAS = "payloads/schemas"
-_SCRIPTS = ("postinst", "prerm", "postrm")
+#: The folders of simulator/ that neither the bridge nor its demonstration uses: naze-bridge-sim.
+SIM = ("commands", "emulated_naze", "flights", "inav", "multiwii", "sky")
 _NEEDLESS = ("bin", "share")
 
 
-def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: str, architecture: str) -> None:
-    """Lay out the package's folder from the installed `libraries` of each Python version."""
+def lay_out(
+    root: Path, sim: Path, libraries: Mapping[str, Path], project: Path, version: str, architecture: str
+) -> None:
+    """Lay out the folders of both packages from the installed `libraries` of each Python version."""
     environment = root / _LIB
     (environment / "bin").mkdir(parents=True)
     (environment / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n")
@@ -47,6 +50,11 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
             shutil.rmtree(folder / name, ignore_errors=True)
         shutil.copytree(folder, sites[-1])
     _share(*sites)
+    for site in sites:
+        part = sim / site.relative_to(root) / "simulator"
+        part.mkdir(parents=True)
+        for name in SIM:
+            (site / "simulator" / name).rename(part / name)
     (root / "usr/bin").mkdir()
     (root / "usr/bin/naze-bridge").symlink_to("../lib/naze-bridge/bin/naze-bridge")
     for unit in _UNITS:
@@ -72,11 +80,15 @@ def lay_out(root: Path, libraries: Mapping[str, Path], project: Path, version: s
     _write(root / "usr/share/bash-completion/completions/naze-bridge", _completion("bash").encode())
     _write(root / "usr/share/zsh/vendor-completions/_naze-bridge", _completion("zsh").encode())
     _copy(_HERE / "lintian-overrides", root / "usr/share/lintian/overrides", "naze-bridge")
-    for path in root.rglob("*"):
+    # Both packages have the same version, so one set of documents.
+    (sim / "usr/share/doc").mkdir(parents=True)
+    (sim / "usr/share/doc/naze-bridge-sim").symlink_to("naze-bridge")
+    for path in (*root.rglob("*"), *sim.rglob("*")):
         if not path.is_symlink():
             runs = path.is_dir() or path.parent == environment / "bin" or path == documents / "firmware/apply"
             path.chmod(0o755 if runs else 0o644)
-    _describe(root, version, architecture)
+    _describe(root, _HERE, version, architecture)
+    _describe(sim, _HERE / "sim", version, "all")
 
 
 def _share(first: Path, *others: Path) -> None:
@@ -105,19 +117,22 @@ def _copy(source: Path, folder: Path, name: str = "") -> None:
     shutil.copyfile(source, folder / (name or source.name))
 
 
-def _describe(root: Path, version: str, architecture: str) -> None:
+def _describe(root: Path, described: Path, version: str, architecture: str) -> None:
+    """Add the control files; those that are not computed are in the folder `described`."""
     folder = root / "DEBIAN"
     folder.mkdir(mode=0o755)
     files = sorted(path for path in root.rglob("*") if path.is_file() and not path.is_symlink())
     sums = [f"{_md5(path)}  {path.relative_to(root)}\n" for path in files]
     size = sum(size for _, size in {(path.stat().st_ino, path.stat().st_size) for path in files})
-    fields = (_HERE / "control").read_text().format(version=version, architecture=architecture, kilobytes=size // 1024)
+    fields = (
+        (described / "control").read_text().format(version=version, architecture=architecture, kilobytes=size // 1024)
+    )
     (folder / "control").write_text(fields)
     (folder / "md5sums").write_text("".join(sums))
-    shutil.copyfile(_HERE / "triggers", folder / "triggers")
-    for script in _SCRIPTS:
-        shutil.copyfile(_HERE / script, folder / script)
-        (folder / script).chmod(0o755)
+    for name in ("triggers", "postinst", "prerm", "postrm"):
+        if (described / name).exists():
+            shutil.copyfile(described / name, folder / name)
+            (folder / name).chmod(0o644 if name == "triggers" else 0o755)
 
 
 def _md5(path: Path) -> str:

@@ -63,6 +63,12 @@ class _Main(LazyGroup):
                 sys.exit(1)
             complain("interrupted")
             sys.exit(INTERRUPTED)
+        except ModuleNotFoundError as error:
+            # deb/tree.py divides the program into two packages.
+            if not (error.name or "").startswith("simulator."):
+                raise
+            complain("this command is in the package naze-bridge-sim, from where naze-bridge is: install both together")
+            sys.exit(1)
         except OSError as error:
             if error.errno not in _UNWRITABLE:
                 raise
