@@ -12,15 +12,19 @@ import shutil
 import tarfile
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import click
 from segno.helpers import make_wifi_data
 
 from protocols.plain_text import plain_text
+from service.cli.helper.action import HelperRefusal
+from service.cli.helper.signature import SIGNERS, check_signature, has_key, is_signed
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
 from service.cli.setup.hotspot import ADDRESS, CONNECTION
+from service.machine.package import shipped
 from service.settings.passphrase import STRONGER, new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
@@ -67,7 +71,8 @@ mkdir -p {_LINK.rpartition("/")[0]}
 ln -sf {_UNIT} {_LINK}
 [ "${{1-}}" != start ] || {{ systemctl daemon-reload; systemctl start --no-block naze-bridge-card; }}
 """
-#: Each step may be cut by the end of the power, and is then repeated. The result is for a person with the card in a PC.
+#: Each step may be cut by the end of the power, and is then repeated. The result is for a person with the card in a PC,
+#: the LED for a person without one; `led` gets the times on and off, ms (the kernel's ledtrig-timer).
 _FIRST_BOOT = """\
 #!/bin/sh
 # Written by `naze-bridge card`. Its log is {log}.
@@ -82,13 +87,23 @@ tell() {{
     mv "$result.new" "$result"
     sync
 }}
+led() {{
+    for led in /sys/class/leds/ACT /sys/class/leds/led0; do
+        if [ -e $led ]; then echo timer >$led/trigger && echo $1 >$led/delay_on && echo $2 >$led/delay_off || true; fi
+    done
+}}
 step() {{
-    step=$1 remedy=$2
+    step=$1 remedy=$2 failed=${{3:-1000 1000}}
     echo "-- $step"
+    led 100 100
     tell "naze-bridge is not set up yet. Now: $step." "Leave the Pi on for 5 minutes. If this text stays: $remedy"
 }}
-trap '[ $? = 0 ] || tell "naze-bridge is not set up: $step failed. The Pi tries again every 30 s while it is on." \\
-    "$remedy" "" "The end of the log:" "$(tail -n 5 {log})"' EXIT
+fail() {{
+    led $failed
+    tell "naze-bridge is not set up: $step failed. The Pi tries again every 30 s while it is on." \\
+        "$remedy" "" "The end of the log:" "$(tail -n 5 {log})"
+}}
+trap '[ $? = 0 ] || fail' EXIT
 package="$here/naze-bridge.deb" format='${{db:Status-Status}} ${{Version}}'
 step 'installing the package' 'Prepare the card again, with a package that you fetched again.'
 wanted="installed $(dpkg-deb --field "$package" Version)"
@@ -106,8 +121,9 @@ fi
 step 'setting the Pi up' 'Look at the end of the log, and prepare the card again with other answers.'
 # Status 1 is also doctor's, for a flight controller that is not connected yet, and a hotspot's that does not open.
 naze-bridge setup --yes --keep-hotspot {options} || [ -e /etc/naze-bridge/setup.toml ]
-step 'opening the hotspot' 'Does this Pi have Wi-Fi, and is the country right? Then prepare the card again.'
+step 'opening the hotspot' 'Does this Pi have Wi-Fi, and is the country right? Then prepare the card again.' '100 1900'
 LC_ALL=C nmcli --get-values GENERAL.STATE connection show {connection} | grep -x activated
+led 100 0
 tell 'naze-bridge is set up. The Pi restarts once; then join its hotspot:' {ssid} '' 'The status page: {page}'
 mv "$here" "$here.done"
 {clean_up}
@@ -153,7 +169,7 @@ def card(
     named = ["--country", country.upper(), *(["--name", name] if name else [])]
     secrets = {"password": password, "web-token": token, **({"key": key} if key else {})}
     try:
-        prepare(boot, package, hotspot, named, secrets)
+        click.echo(f"Package: {prepare(boot, package, hotspot, named, secrets)}.")
     except CardError as error:
         fail(error)
     except OSError as error:
@@ -168,16 +184,16 @@ def card(
         show_secret("The key, for ground stations that may make changes", key, f"{kept_in}/key", key)
 
 
-def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> None:
+def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> str:
     """Add the folder and the hook. `options`: more of setup. `secrets`: by file name. It may be repeated.
 
-    CardError: this is not a freshly written card; nothing was changed.
+    Returns the checked properties of the package. CardError: this is no freshly written card. Nothing was changed.
     """
     if not (boot / "cmdline.txt").exists() or not (boot / "config.txt").exists():
         raise CardError(
             f"{boot} is not the boot partition of a Raspberry Pi OS card: it has no cmdline.txt or config.txt"
         )
-    _check_package(package, boot)
+    checked = _check_package(package, boot)
     hook = _hooked(boot)
     folder = boot / FOLDER
     shutil.rmtree(folder, ignore_errors=True)
@@ -195,6 +211,7 @@ def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: d
     _write(folder / "enable.sh", _ENABLE)
     if hook is not None:
         _write(*hook)  # last: a card that was pulled out before it starts as if untouched
+    return checked
 
 
 def _first_boot(ssid: str, options: str) -> str:
@@ -203,7 +220,7 @@ def _first_boot(ssid: str, options: str) -> str:
     return _FIRST_BOOT.format(log=_LOG, result=RESULT, options=options, **named)
 
 
-def _check_package(path: Path, boot: Path) -> None:
+def _check_package(path: Path, boot: Path) -> str:
     try:
         package = read_package(path)
     except ValueError as error:
@@ -214,6 +231,24 @@ def _check_package(path: Path, boot: Path) -> None:
     if package.architecture not in _ARCHITECTURES or needed not in (package.architecture, None):
         wanted = needed or " or ".join(_ARCHITECTURES)
         raise CardError(f"{path} is for {package.architecture}; this card needs the one for {wanted}")
+    return f"{package.version} for {package.architecture}, complete, {_check_signed(path)}"
+
+
+def _check_signed(package: Path) -> str:
+    """The signature's state. A package that does not match the signature that it carries is refused."""
+    keys = Path(SIGNERS) if Path(SIGNERS).exists() else shipped("deb/signers")
+    if not is_signed(package):
+        return "not signed"
+    if not (keys.exists() and has_key(keys.read_text())):
+        return "signed; this naze-bridge knows no key to check that"
+    with TemporaryDirectory() as folder:
+        copied = Path(folder, "package")
+        shutil.copyfile(package, copied)
+        try:
+            check_signature(copied, keys)
+        except HelperRefusal as error:
+            raise CardError(f"{package}: {error}") from error
+    return "signed by naze-bridge's releases"
 
 
 def _architecture(boot: Path) -> str | None:

@@ -70,6 +70,7 @@ _EXPECTED_SECRETS = [
     "/etc/naze-bridge/gcs.key naze-bridge 600",
     "/var/lib/private/naze-bridge/web-token naze-bridge 600",
 ]
+_LED = "cd /sys/class/leds/ACT && echo -n $(cat trigger delay_on delay_off)"
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"
 
 
@@ -162,6 +163,7 @@ def test_the_package_has_the_expected_files(package: Path) -> None:
         "/usr/share/bash-completion/completions/naze-bridge",
     ):
         assert expected in files
+    assert not [name for name in files if "/simulator/sky" in name]
     dialects = {name.partition("/dialects/")[2] for name in files if "/pymavlink/dialects/" in name}
     assert dialects - {""} == {"__init__.py", "v20", "v20/__init__.py", "v20/all.py"}
     assert {(member.uid, member.gid) for member in files.values()} == {(0, 0)}
@@ -230,6 +232,14 @@ def test_it_is_installed_used_upgraded_removed_and_purged(
     printed = root.run("naze-bridge demo --once")
     assert "the flight controller holds 13, read back from it and compared" in printed
 
+    assert "this command is in the package naze-bridge-sim" in root.run("naze-bridge fly --help", status=1)
+    (sim,) = package.parent.glob("naze-bridge-sim_*_all.deb")
+    root.put(sim, "/root/naze-bridge-sim.deb")
+    root.run("dpkg --install /root/naze-bridge-sim.deb")
+    assert "Judge the mission's real flight" in root.run("naze-bridge fly --help")
+    assert "--inav-version" in root.run("naze-bridge sim --help")
+    root.run("dpkg --remove naze-bridge-sim && ! ls -d /usr/lib/naze-bridge/lib/*/site-packages/simulator/sky")
+
     root.run(_START)
     assert "ACCEPTED" in root.run("naze-bridge push /root/naze-field.waypoints")
     assert "VERIFIED" in root.run("naze-bridge missions list")
@@ -283,6 +293,7 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     root.put(b"#!/bin/sh\n[ -e /root/radio ] && echo activated\n", "/usr/bin/nmcli")
     root.run("chmod +x /usr/bin/nmcli")
     root.run("ln -s private/naze-bridge /var/lib/naze-bridge")  # as DynamicUser= makes it
+    root.run("mkdir -p /sys/class/leds/ACT")
 
     if system == "bookworm":
         root.run("bash /boot/firmware/firstrun.sh")
@@ -297,11 +308,13 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     result = root.run("cat /boot/firmware/naze-bridge-RESULT.txt")
     assert "naze-bridge is not set up: opening the hotspot failed. The Pi tries again every 30 s" in result
     assert "Does this Pi have Wi-Fi" in result
+    assert root.run(_LED) == "timer 100 1900"  # waits for the hotspot
     root.run("ls /boot/firmware/naze-bridge/first-boot.sh")
     root.run("touch /root/radio")
     root.run(start)
     root.run(start)  # the power was cut before the unit was removed
     assert "naze-bridge is set up." in root.run("cat /boot/firmware/naze-bridge-RESULT.txt")
+    assert root.run(_LED) == "timer 100 0"  # on
 
     # Installed once, although it was tried twice.
     assert root.run("cat /var/log/naze-bridge-card.log").count("Unpacking naze-bridge") == 1

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from service.cli.helper.action import DELAY_S, HelperRefusal, ThisPi
-from service.cli.helper.signature import SIGNERS, check_signature
+from service.cli.helper.signature import SIGNERS, check_signature, has_key
 from service.cli.setup.change import Machine, Run, SetupError, WriteFile, later
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine.host import Host
@@ -69,7 +69,7 @@ def receive(pi: ThisPi, size: int) -> str:
 
 def can_update(host: Host) -> bool:
     """True if the installed package knows a key of its releases."""
-    return any(not line.startswith("#") for line in host.read(SIGNERS).splitlines())
+    return has_key(host.read(SIGNERS))
 
 
 def check_package(path: Path, machine: Machine) -> str:

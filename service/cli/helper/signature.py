@@ -4,7 +4,7 @@
 import os
 import subprocess
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import TemporaryDirectory
 
 from service.cli.helper.action import HelperRefusal
 
@@ -27,22 +27,35 @@ def add_signature(package: Path, signature: bytes) -> None:
         file.write(_HEADER % (_NAME, 0, 0, 0, 0o100644, len(signature)) + signature + b"\n" * (len(signature) % 2))
 
 
+def has_key(signers: str) -> bool:
+    """True if a text of allowed signers has a key."""
+    return any(line and not line.startswith("#") for line in signers.splitlines())
+
+
+def is_signed(package: Path) -> bool:
+    return _NAME in _tail(package)
+
+
+def _tail(package: Path) -> bytes:
+    with package.open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - _MOST))
+        return file.read()
+
+
 def check_signature(package: Path, signers: Path) -> None:
     """Check the signature of a package, and remove it. Raises HelperRefusal if it is missing, or of no known key.
 
     What is left is exactly what was signed. Nothing else reads the package before.
     """
-    with package.open("r+b", buffering=0) as file, NamedTemporaryFile(suffix=".sig") as signature:
-        file.seek(max(0, file.seek(0, os.SEEK_END) - _MOST))
-        tail = file.read()
-        start = tail.rfind(_NAME)
-        if start < 0:
-            raise HelperRefusal("This package is not signed: take it from the releases of naze-bridge.")
-        signature.write(tail[start + _HEADER_SIZE :])
-        signature.flush()
-        file.truncate(file.tell() - len(tail) + start)
-        file.seek(0)
-        named = ("-I", _SIGNER, "-n", NAMESPACE, "-f", str(signers), "-s", signature.name)
+    tail = _tail(package)
+    start = tail.rfind(_NAME)
+    if start < 0:
+        raise HelperRefusal("This package is not signed: take it from the releases of naze-bridge.")
+    with package.open("r+b", buffering=0) as file, TemporaryDirectory() as folder:
+        signature = Path(folder, "sig")
+        signature.write_bytes(tail[start + _HEADER_SIZE :])
+        file.truncate(package.stat().st_size - len(tail) + start)
+        named = ("-I", _SIGNER, "-n", NAMESPACE, "-f", str(signers), "-s", str(signature))
         try:
             command = ("ssh-keygen", "-Y", "verify", *named)
             done = subprocess.run(command, stdin=file, capture_output=True, check=False, timeout=_TIMEOUT_S)  # noqa: S603  # our own words

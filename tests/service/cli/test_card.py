@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 from service.cli.main import main
 from terminal import sentences
 from tests.service.cli.helper.test_packages import packed
+from tests.support.release_key import ReleaseKey
 
 _SYSTEMD_RUN = "systemd.run=/boot/firstrun.sh systemd.run_success_action=reboot systemd.unit=kernel-command-line.target"
 _FIRSTRUN = "#!/bin/bash\n\nset +e\n\necho kite >/etc/hostname\nrm -f /boot/firstrun.sh\nexit 0\n"
@@ -181,6 +182,20 @@ def test_the_cards_kernels_decide_the_architecture(
     for architecture in ("arm64", "armhf", "amd64"):
         packed(card.boot.parent, version="99.0", architecture=architecture)
         assert (card.prepare().exit_code == 0) is (architecture in accepted)
+
+
+def test_a_signature_is_checked_if_the_package_has_one(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
+    card.trixie()
+    key = ReleaseKey(card.boot.parent / "key")
+    monkeypatch.setattr("service.cli.card.SIGNERS", str(key.signers))
+    assert "99.0 for arm64, complete, not signed." in card.prepare().output
+    key.sign(card.package)
+    assert "complete, signed by naze-bridge's releases." in card.prepare().output
+    signed = card.package.read_bytes()
+    card.package.write_bytes(signed.replace(b"2.0", b"3.0", 1))
+    refused = card.prepare()
+    assert refused.exit_code == 1
+    assert "The signature of this package is wrong" in " ".join(refused.output.split())
 
 
 def test_a_card_whose_first_start_failed_is_prepared_again(card: Card) -> None:
