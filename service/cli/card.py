@@ -239,7 +239,7 @@ def _check_signed(package: Path) -> str:
     keys = Path(SIGNERS) if Path(SIGNERS).exists() else shipped("deb/signers")
     if not is_signed(package):
         return "not signed"
-    if not (keys.exists() and has_key(keys.read_text())):
+    if not (keys.exists() and has_key(read_bounded(keys, _MAX_BYTES).decode())):
         return "signed; this naze-bridge knows no key to check that"
     with TemporaryDirectory() as folder:
         copied = Path(folder, "package")

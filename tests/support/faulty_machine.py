@@ -3,6 +3,7 @@
 
 import grp
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from service.machine.host import Host
@@ -40,9 +41,9 @@ class FaultyMachine(Host):
         return str(device).startswith("/dev/tty") and self.path(device).is_file()
 
     def owned_by(self, path: str, group: str) -> None:
-        """Give a file to a group. Only root can; other users keep their own group."""
-        if os.geteuid() == 0:
-            os.chown(self.path(path), 0, grp.getgrnam(group).gr_gid)
+        """Give a file to a group. Only root and the group's members can: for other users it keeps theirs."""
+        with suppress(PermissionError):
+            os.chown(self.path(path), -1, grp.getgrnam(group).gr_gid)
 
     def runs(self, pid: int, *arguments: str, has_open: str = "") -> None:
         """Add a running program with an open file or socket."""

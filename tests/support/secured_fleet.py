@@ -28,7 +28,9 @@ class Fleet:
         """The example `of` (vehicle or pilot) with the files of `name`."""
         path = self.folder / f"{name}-{of}.json5"
         text = (self.folder / f"{of}.json5").read_text()
-        path.write_text(text.replace({"vehicle": "naze-1", "pilot": "pilot"}[of], name) if of != name else text)
+        # The folder's own path may have the same word.
+        replaced = {"vehicle": "naze-1", "pilot": "pilot"}[of]
+        path.write_text(str(self.folder).join(part.replace(replaced, name) for part in text.split(str(self.folder))))
         return path
 
     def open(self, of: str, name: str) -> zenoh.Session:
