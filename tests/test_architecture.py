@@ -88,7 +88,7 @@ OWN_FILES = {
     "service/links/serial_ports.py",
     "service/machine/captive_portal.py",
     "service/machine/package.py",
-    "service/web/static_files.py",
+    "service/web/server.py",
     "storage/database.py",
     "storage/small_files.py",
 }

@@ -15,9 +15,12 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from bridge.settings.local_settings import by_parameter
 from payloads.comparison import shown, stored_mission
-from payloads.mission_data import to_json
+from payloads.mission_data import ACCEPTED, Json, to_json
+from protocols.param_file import write_param_file
 from service.daemon.api import DaemonApi
+from service.daemon.client import ControlError
 from service.daemon.daemon import Daemon
 from service.daemon.telemetry_logs import TelemetryLogs
 from service.machine.host import Host
@@ -29,8 +32,7 @@ from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.pi_control import PiControl
 from service.web.replies import Turns, begun, json_reply, path_number, text_reply, whole
-from service.web.sent_files import MissionWriter, SentFiles
-from service.web.settings_history import SettingsHistory
+from service.web.sent_files import MissionWriter, Progress, SentFiles
 from storage.store_error import StoreError
 
 _LISTED = 50
@@ -48,7 +50,6 @@ class Api:
         self._turns = Turns()
         self._writer = MissionWriter()
         self._files = SentFiles(self._api, self._writer)
-        self._settings = SettingsHistory(self._api.settings, self._writer, self._turns)
         self._pi = PiControl(daemon, self._writer)
         self._map = {"tiles": str(settings.map_tiles), "credit": settings.map_credit}
         state_dir = daemon.settings.state_dir
@@ -73,7 +74,10 @@ class Api:
             route("GET", "/api/logs", self._list_logs, check_token),
             route("GET", "/api/logs/{name}", self._read_log, check_token),
             route("GET", "/metrics", self._render_metrics),
-            *self._settings.routes(),
+            route("GET", "/api/settings", self._list_settings),
+            route("GET", "/api/settings/{number}", self._show_settings),
+            route("GET", "/api/settings/{number}/file", self._settings_file),
+            route("POST", "/api/settings/{number}/restore", self._restore_settings, check_token),
             *self._files.routes(),
             *self._pi.routes(),
         ]
@@ -140,6 +144,41 @@ class Api:
     async def _restore(self, request: Request) -> Response:
         number = path_number(request, "number")
         return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
+
+    async def _list_settings(self, _request: Request) -> Response:
+        return json_reply(await self._api.settings.backups(_LISTED))
+
+    async def _show_settings(self, request: Request) -> Response:
+        """The changes in a backup, and the changes that restoring it would make now.
+
+        An unauthenticated request never uses the flight controller's line.
+        """
+        async with self._turns.take():
+            backup = await self._find_settings(request)
+            try:
+                plan: Json = await self._api.settings.plan(backup["values"], backup["kind"], is_checked=False)
+            except ControlError as error:
+                plan = {"refused": str(error)}
+            del backup["values"]
+            return json_reply(backup | {"plan": plan})
+
+    async def _settings_file(self, request: Request) -> Response:
+        backup = await self._find_settings(request)
+        text = write_param_file(by_parameter(backup["values"]), backup["kind"])
+        headers = {"Content-Disposition": f'attachment; filename="settings-{backup["number"]}.param"'}
+        return Response(text, headers=headers, media_type="application/octet-stream")
+
+    async def _restore_settings(self, request: Request) -> Response:
+        backup = await self._find_settings(request)
+
+        async def write(progress: Progress) -> Json:
+            result = await self._api.settings.restore(backup["values"], backup["kind"], "status page", progress)
+            return {"ack": ACCEPTED if result["is_saved"] else "", "text": result["text"]}
+
+        return begun(self._writer.begin(f"settings {backup['number']}", write, "settings"))
+
+    async def _find_settings(self, request: Request) -> Json:
+        return await self._api.settings.backup(path_number(request, "number"))
 
     async def _reset_signing(self, _request: Request) -> Response:
         return json_reply(await self._api.do({"do": "reset-signing"}, lambda _: None))

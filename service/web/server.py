@@ -3,20 +3,25 @@
 
 import asyncio
 import logging
+import secrets
+from collections.abc import Iterator
 from contextlib import suppress
+from http import HTTPStatus
+from pathlib import Path
 
 import structlog
 from starlette.applications import Starlette
 from starlette.middleware.cors import CORSMiddleware
+from starlette.requests import Request
+from starlette.responses import Response
 from uvicorn.config import Config
 from uvicorn.server import ServerState
 
 from service.daemon.daemon import Daemon
 from service.settings.web import WebSettings
-from service.web.access import EXCEPTION_HANDLERS, SafeHeaders, route
+from service.web.access import EXCEPTION_HANDLERS, Handler, SafeHeaders, route
 from service.web.api import Api
 from service.web.connection_limit import BoundedConnection, ConnectionLimit
-from service.web.static_files import static_files
 from service.web.token import DEFAULT_NAME, Token, TokenError
 from storage.os_error import reason
 
@@ -24,6 +29,8 @@ from storage.os_error import reason
 _RETRY_S = 2.0
 #: New connections are accepted a few at a time, so that the links are served in turn.
 _BACKLOG = 16
+_FOLDER = Path(__file__).parent / "static"
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _log = structlog.get_logger()
 
 
@@ -80,7 +87,7 @@ class WebServer:
 
 
 def _config(api: Api, settings: WebSettings, token: Token | TokenError) -> Config:
-    routes = [*api.routes(), *(route("GET", *each) for each in static_files())]
+    routes = [*api.routes(), *(route("GET", *each) for each in _static_files())]
     app = Starlette(routes=routes, exception_handlers=EXCEPTION_HANDLERS)
     app.state.hosts, app.state.token = settings.hosts, token
     # uvicorn would log only the errors of browsers; ours are logged by `failed`.
@@ -107,3 +114,25 @@ def _token(daemon: Daemon, settings: WebSettings) -> Token | TokenError:
     except TokenError as error:
         _log.error("web.no_token", why=str(error), what="the page is read-only")
         return error
+
+
+def _static_files() -> Iterator[tuple[str, Handler]]:
+    """Yield path and handler of each of the page's files. They are in memory, so no request waits for the card."""
+    # Of this start: Chromium keeps the headers of its stored copy, too.
+    etag = f'"{secrets.token_hex(8)}"'
+    for file in sorted(_FOLDER.iterdir()):
+        if file.suffix in _TYPES:
+            yield "/" if file.name == "index.html" else f"/{file.name}", _handler(file, etag)
+
+
+def _handler(file: Path, etag: str) -> Handler:
+    body, kind = file.read_bytes(), _TYPES[file.suffix]
+    # Never cached, so that a page does not mix files of two versions.
+    headers = {"ETag": etag, "Cache-Control": "no-cache"}
+
+    async def serve(request: Request) -> Response:
+        if request.headers.get("if-none-match") == etag:
+            return Response(status_code=HTTPStatus.NOT_MODIFIED, headers=headers)
+        return Response(body, headers=headers, media_type=kind)
+
+    return serve

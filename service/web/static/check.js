@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The state of the wires; doctor's findings, each with its remedy as a button where the Pi can carry it out; the logs.
-import { askWithToken, fetchBytes, hasToken } from "./daemon.js";
+import { aftermath, askPi, askWithToken, fetchBytes, hasToken } from "./daemon.js";
 import { action, byId, make, resultPlace, say, setText } from "./dom.js";
-import { aftermath, askPi } from "./pi_request.js";
 import { evidence } from "./state_bar.js";
 
 const PAUSE_MS = 2000, MOST_LINES = 300;

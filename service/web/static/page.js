@@ -7,10 +7,9 @@ import { showConnect, showValues } from "./fly.js";
 import { HeldMission } from "./held_mission.js";
 import { followTiles } from "./map_tiles.js";
 import { followFile } from "./mission_file.js";
-import { showMissions } from "./missions.js";
 import { openPi } from "./pi.js";
-import { showSettings } from "./settings.js";
 import { showStateBar } from "./state_bar.js";
+import { showMissions, showSettings } from "./stored.js";
 import { followWrites } from "./write_form.js";
 
 const INTERVAL_MS = 800, TRANSFER_INTERVAL_MS = 250;

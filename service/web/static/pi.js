@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Pi itself: setup's questions, the bridge's settings, updates, and going back. Its root helper answers.
-import { hasToken, postWithToken } from "./daemon.js";
+import { aftermath, askPi, hasToken, postWithToken } from "./daemon.js";
 import { action, byId, form, make, pressed, resultPlace, say } from "./dom.js";
-import { aftermath, askPi, stepList } from "./pi_request.js";
 
 const PIECE = 256 * 1024, MOST_BYTES = 128 * 1024 * 1024;
 const LATER = "The bridge restarts during the installation, which takes some minutes. Then open this again to see the result.";
@@ -63,6 +62,10 @@ function setup(pi) {
     return "";
   }
   return fold(pi.is_set_up ? "Setup" : "First questions", true, questions, plan);
+}
+
+function stepList(steps) {
+  return make("ul", {}, ...steps.map(({ purpose, changes }) => make("li", {}, purpose, make("span", { class: "why" }, changes.join("; ")))));
 }
 
 // Only what differs from the answers so far.

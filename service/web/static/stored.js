@@ -1,17 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The backups of the flight controller's settings; each opens in place, with what restoring it changes.
+// What the Pi has stored: missions, and backups of the flight controller's settings. Each opens in place.
 import { ask, postWithToken } from "./daemon.js";
 import { byId, make, showEntries } from "./dom.js";
-import { when } from "./mission_tables.js";
+import { missionDetail, outcomeClass, when } from "./mission_tables.js";
 import { writeForm } from "./write_form.js";
+
+export async function showMissions(newest) {
+  const { missions } = await ask("/api/missions");
+  if (newest === null) {
+    for (const id of ["missions", "upload"]) byId(id).replaceChildren(make("p", {}, "No mission has been received yet."));
+    return;
+  }
+  byId("upload").replaceChildren(...missionDetail(await ask(`/api/missions/${newest.number}`)));
+  showEntries(byId("missions"), missions, { name: "Mission", summary: missionSummary, contents: missionContents });
+}
+
+const missionSummary = ({ number, received_at: receivedAt, source, outcome, detail, item_count: items, finding_count: notes }) => [
+  make("b", {}, String(number)), " ", make("span", { class: outcomeClass(outcome) }, outcome), ` ${when(receivedAt)}`,
+  make("span", { class: "why" }, `${items} items, ${notes} notes, from ${source}. ${detail}`)];
+
+const missionContents = async (number) => [
+  writeForm(`Write mission ${number} again`, () => postWithToken(`/api/missions/${number}/restore`)),
+  ...missionDetail(await ask(`/api/missions/${number}`))];
 
 export async function showSettings() {
   const { backups } = await ask("/api/settings");
   if (!backups.length) return byId("settings").replaceChildren(make("p", {}, "No settings have been read yet."));
-  showEntries(byId("settings"), backups, { name: "Settings", summary, contents: async (number) => detail(await ask(`/api/settings/${number}`)) });
+  showEntries(byId("settings"), backups, { name: "Settings", summary: settingsSummary, contents: async (number) => detail(await ask(`/api/settings/${number}`)) });
 }
 
-const summary = ({ number, taken_at: takenAt, occasion, changed_count: changed, setting_count: count, kind }) => [
+const settingsSummary = ({ number, taken_at: takenAt, occasion, changed_count: changed, setting_count: count, kind }) => [
   make("b", {}, String(number)), ` ${when(takenAt)}`,
   make("span", { class: "why" }, `${changed === null ? `first, ${count} settings` : `${changed} of ${count} changed`}, ${occasion}, ${kind}`)];
 
