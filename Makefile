@@ -10,9 +10,10 @@
 #   make pictures       retake the docs' pictures of the status page, and the README's terminal cast
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts;
 #                       FLY=1: flights too)
-#   make soak           kill -9 and damaged stores by the hundred, networks of 50 daemons cut, then the daemon through all
-#                       kinds of events and attacks for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
-#   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files: hours (EXAMPLES=500: a 26th of them)
+#   make soak           kill -9 and damaged stores by the hundred, networks of 50 daemons cut, every power cut of the flash,
+#                       then the daemon under events and attacks for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
+#   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files, then each search of the tests with
+#                       1,000 examples instead of 40: hours (EXAMPLES=500: a 26th of the inputs)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
 #   make image-check    the first hour in a bare Debian with systemd: install, setup, a verified mission (root)
 #   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
@@ -94,10 +95,12 @@ soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \
 	    tests/storage/test_store_durability.py tests/storage/test_salvage.py
 	FLEET_DAEMONS=50 FLEET_CUTS=5 $(BIN)/python -m pytest tests/fleet/test_fleet_soak.py
+	$(MAKE) -C firmware test
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)
 
 fuzz: $(VENV)/.test-ready
 	FUZZ_EXAMPLES=$(or $(EXAMPLES),13000) $(BIN)/python -m pytest tests/scenarios/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
+	FUZZ_EXAMPLES=1000 $(BIN)/python -m pytest -m hypothesis --ignore tests/scenarios/test_fuzz.py --timeout 0 --numprocesses $(JOBS) $(ARGS)
 
 deb: $(VENV)/.demo-ready
 	$(BIN)/python -m deb.build $(ARCH)

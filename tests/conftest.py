@@ -15,8 +15,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell starts background jobs with SIGINT ignored, and programs started by tests would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# No deadlines: the machine may be busy.
-settings.register_profile("unhurried", deadline=None)
+# No deadlines: the machine may be busy. A short form of each search: `make fuzz` has the long one.
+settings.register_profile("unhurried", deadline=None, max_examples=int(os.environ.get("FUZZ_EXAMPLES", "40")))
 settings.load_profile("unhurried")
 
 #: The longest files. They start first; otherwise one of them could run alone at the end.
@@ -33,6 +33,16 @@ _WAITING = tuple(
     f"tests/{name}/"
     for name in ("service/web", "fleet", "e2e", "attack", "service/cli", "service/links", "service/settings")
 )
+#: The marker `slow`, which an inner loop leaves out: these folders and files.
+_SLOW = (
+    *_WAITING,
+    *(f"tests/{name}/" for name in ("conformance", "firmware", "packaging", "real_board", "scenarios")),
+    *(f"tests/bridge/{name}" for name in (
+        "controllers/harakiri/test_mission_store", "fc/test_profile", "settings/test_known_settings",
+        "transfers/test_uploads",
+    )),
+    "tests/service/test_loop_budget",
+)  # fmt: skip
 
 
 def pytest_asyncio_loop_factories() -> Mapping[str, type[EventLoop]]:
@@ -72,6 +82,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     place = {file: at / len(kind) for kind in (waiting, computing) for at, file in enumerate(kind)}
     place |= {file: at - len(_LONG) for file in files for at, long in enumerate(_LONG) if file.startswith(long)}
     items.sort(key=lambda item: (place[_file(item)], _file(item)))
+    for item in items:
+        if item.nodeid.startswith(_SLOW):
+            item.add_marker(pytest.mark.slow)
 
 
 def _file(item: pytest.Item) -> str:

@@ -79,11 +79,15 @@ def test_a_crowd_does_not_displace_a_pilot(start: Starter, stack: ExitStack) -> 
         found: list[str] = bench.daemon.ask({"do": "status"})["ground_stations"]
         return found
 
+    def is_full() -> bool:
+        pilot.send(HELLO)  # a station that falls silent makes room
+        return len(connected()) == 32
+
     with udp_station(bench.daemon.address, sysid=253) as pilot:
         assert receives_heartbeats(pilot, 3)
         streams = m.MAVLink_request_data_stream_message(1, 1, 0, 50, 1)
         with Watch(bench.daemon), crowd(bench, stack, HELLO, streams, size=300, per_s=10, at_once=10):
-            until(lambda: len(connected()) == 32, "the crowd")
+            until(is_full, "the crowd")
             assert receives_heartbeats(pilot, 3)
             assert any(str(pilot.own_address[1]) in station for station in connected())
             assert_uploads(pilot, bench.board, plain_plan(20))

@@ -533,4 +533,4 @@ class SameAnswers(RuleBasedStateMachine):
 
 
 TestSameAnswers = SameAnswers.TestCase
-TestSameAnswers.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)
+TestSameAnswers.settings = settings(stateful_step_count=60)

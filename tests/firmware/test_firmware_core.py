@@ -22,10 +22,10 @@ def make(*arguments: str) -> str:
     return printed
 
 
-# Each pair of compiler, standard and word size once. One build cuts the power at every operation; the others are for
-# differences between compilers, and cut it at some. `make -C firmware test` makes all cuts in all eight builds.
+# Each pair of compiler, standard and word size once, with some of the power cuts. `make soak` makes all cuts in all
+# eight builds.
 @pytest.mark.parametrize(
-    ("build", "cut_step"), [("gcc-c99-64", 1), ("gcc-c11-32", 7), ("clang-c99-32", 11), ("clang-c11-64", 13)]
+    ("build", "cut_step"), [("gcc-c99-64", 5), ("gcc-c11-32", 17), ("clang-c99-32", 23), ("clang-c11-64", 29)]
 )
 def test_core_survives_power_cuts_under_sanitizers(build: str, cut_step: int) -> None:
     flights = 300 // cut_step
@@ -47,8 +47,8 @@ def test_core_passes_the_tests_on_an_emulated_cortex_m3() -> None:
     assert re.search(r"\d+ checks passed", printed)
 
 
-def test_a_thousand_random_missions_are_flown_as_the_manual_says() -> None:
-    assert "1000 lists flown" in make("flights", "FLIGHTS=1000")
+def test_random_missions_are_flown_as_the_manual_says() -> None:
+    assert "300 lists flown" in make("flights", "FLIGHTS=300")
 
 
 _RULES = {

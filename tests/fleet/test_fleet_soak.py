@@ -23,7 +23,7 @@ from tests.support.plan import plain_plan
 from tests.support.programs import free_port, until
 from tests.support.zenoh_bench import body
 
-DAEMONS, CUTS = int(os.environ.get("FLEET_DAEMONS", "4")), int(os.environ.get("FLEET_CUTS", "2"))
+DAEMONS, CUTS = int(os.environ.get("FLEET_DAEMONS", "4")), int(os.environ.get("FLEET_CUTS", "1"))
 _AT_ONCE = 5
 #: Longer than zenoh's lease of 10 s: both ends give the session up.
 _CUT_S = 12.0

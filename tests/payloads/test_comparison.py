@@ -5,7 +5,7 @@ import json
 import math
 from dataclasses import asdict, replace
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -38,7 +38,6 @@ lists = st.lists(items, min_size=1, max_size=20).map(lambda each: [HOME, *each])
 COMPARED = ("p1", "p2", "p3", "p4", "lat_e7", "lon_e7", "alt_m")
 
 
-@settings(deadline=None)
 @given(lists)
 @example([HOME, FAR, FAR, FAR, FAR, replace(FAR, command=20, lat_e7=None)])
 def test_every_difference_has_a_reason(sent: list[MissionItem]) -> None:

@@ -4,7 +4,7 @@
 import random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
@@ -232,7 +232,6 @@ def test_a_chunk_size_beyond_a_frame_is_limited(records: int) -> None:
         max_size=6,
     )
 )
-@settings(max_examples=60, deadline=None)
 def test_any_telemetry_is_shown_or_dropped(payloads: list[bytes]) -> None:
     board = FakeExtension()
     board.telemetry = dict(zip(TELEMETRY, payloads, strict=True))

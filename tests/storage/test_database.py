@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, open_store
@@ -102,7 +102,6 @@ def test_pages_overwritten_with_other_pages_are_noticed(path: Path, sound: Path)
     assert_kept_aside(path, damaged)
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     flips=st.lists(st.tuples(st.integers(0, 99) | st.integers(0, 1 << 30), st.integers(1, 255)), min_size=1, max_size=4)
 )

@@ -50,7 +50,7 @@ def store(tmp_path: Path) -> Any:
         yield opened
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(received=RECEIVED, outcome=TEXT, detail=TEXT, at=TIME)
 def test_any_mission_is_stored_unchanged(
     store: MissionStore, received: ReceivedMission, outcome: str, detail: str, at: float

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from math import inf
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink
@@ -186,7 +186,6 @@ def test_on_a_slow_line_the_next_poll_waits_for_the_reply(delay_s: float) -> Non
     turn_s=st.sampled_from([0.0, 0.01]),
 )
 @example(wishes=dict.fromkeys([poll.command for poll in POLLS], 0.02), baud=115200, beside_missions=False, turn_s=0.01)
-@settings(max_examples=60, deadline=None)
 def test_any_requests_fit_the_line_and_the_board(
     wishes: Mapping[Msp, float], baud: int | None, beside_missions: bool, turn_s: float
 ) -> None:

@@ -31,7 +31,7 @@ AT_ONCE = 60
 
 
 @pytest.mark.parametrize("name", BOARDS)
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=st.integers(0, (1 << 64) - 1))
 def test_no_request_changes_a_board(name: str, seed: int) -> None:
     board = BOARDS[name]()

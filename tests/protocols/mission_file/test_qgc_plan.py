@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.mission_file import MissionFileError, read_mission_file, write_mission_file
@@ -194,7 +194,6 @@ json_values = st.recursive(
 )
 
 
-@settings(max_examples=300)
 @given(
     items=st.lists(
         st.builds(simple, command=json_values, frame=json_values, params=json_values) | json_values, max_size=2
@@ -205,7 +204,6 @@ def test_any_json_is_read_or_refused(items: list[Any]) -> None:
     assert refused is None or refused.isprintable()
 
 
-@settings(max_examples=200)
 @given(st.lists(st.none() | st.floats() | st.integers(), min_size=7, max_size=7), json_values)
 def test_any_seven_numbers_make_an_item(params: list[float | None], home: Any) -> None:
     refused = refusal(plan(simple(params=params), home=home))

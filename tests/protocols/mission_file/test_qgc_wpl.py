@@ -6,7 +6,7 @@ import random
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.mission_file import MissionFileError, read_mission_file, write_qgc_wpl
@@ -191,20 +191,17 @@ any_items = st.lists(
 ).map(lambda items: [replace(item, seq=seq) for seq, item in enumerate(items)])
 
 
-@settings(max_examples=300)
 @given(any_items)
 def test_a_written_file_reads_back_the_same(items: list[MissionItem]) -> None:
     assert same(read_mission_file(write_qgc_wpl(items).encode(), "x"), items)
 
 
-@settings(max_examples=300)
 @given(st.binary(max_size=300), st.sampled_from([b"", HEADER.encode() + b"\n", (HEADER + "\n" + HOME + "\n").encode()]))
 def test_garbage_is_one_clear_error(garbage: bytes, before: bytes) -> None:
     refused = refusal(before + garbage)
     assert refused is None or (refused.startswith("garbage") and refused.isprintable())
 
 
-@settings(max_examples=300)
 @given(st.lists(st.sampled_from(["0", "1", "16", "3", "-1", "1e9", "nan", "x", "45.1", "1" * 400]), max_size=14))
 def test_any_line_of_fields_is_read_or_refused(fields: list[str]) -> None:
     refused = refusal("\n".join([HEADER, HOME, "\t".join(fields)]).encode())

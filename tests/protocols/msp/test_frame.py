@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
 
-MANY_BYTES = 1 << 18
+MANY_BYTES = 1 << 16
 
 commands = st.one_of(st.integers(0, 255), st.integers(256, 65535))
 frames = st.builds(MspFrame, st.sampled_from(Direction), commands, st.binary(max_size=40))
@@ -110,7 +110,7 @@ def test_a_reply_after_a_false_header_is_found_at_a_reset_or_more_bytes() -> Non
     assert answer in parser.feed(bytes(64))
 
 
-def test_a_quarter_megabyte_of_any_bytes_takes_bounded_work() -> None:
+def test_many_bytes_of_any_kind_take_bounded_work() -> None:
     draw = random.Random(1)
     for alphabet in (
         bytes(range(256)),

@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.mission_item import ListIdentity, pack_records
@@ -82,7 +82,6 @@ def test_requests_without_a_body_are_clean() -> None:
 
 
 @given(st.lists(records, min_size=1, max_size=40), st.data())
-@settings(max_examples=200)
 def test_any_list_can_be_sent_in_chunks(wanted: Sequence[WpRecord], data: st.DataObject) -> None:
     most = data.draw(st.integers(1, 15))
     sent: list[WpRecord] = []

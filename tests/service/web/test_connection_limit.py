@@ -7,7 +7,7 @@ from functools import partial
 from typing import ClassVar
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from starlette.types import Receive, Scope, Send
 from uvicorn.config import Config
@@ -81,7 +81,6 @@ _STEPS = st.lists(
 )
 
 
-@settings(deadline=None)
 @given(_STEPS)
 def test_the_limits_are_never_exceeded(steps: list[tuple[str, float, bool]]) -> None:
     limit = ConnectionLimit()

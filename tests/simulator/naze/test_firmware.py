@@ -4,7 +4,7 @@
 import struct
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.msp.frame import Direction, request
@@ -243,7 +243,6 @@ def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
         assert first not in (clean, other)
 
 
-@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(

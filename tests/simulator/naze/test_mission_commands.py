@@ -466,7 +466,7 @@ def test_a_power_cut_in_the_configuration_leaves_the_old_or_the_new_one(operatio
     assert bench.pull() == mission(7)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), size=st.integers(1, 60))
 def test_a_persistent_client_gets_a_list_through_a_bad_line(seed: int, size: int) -> None:
     """It repeats until answered and restarts when told to: never a wrong list, and finally the right one."""

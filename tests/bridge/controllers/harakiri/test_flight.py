@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -77,7 +77,6 @@ steps = st.tuples(st.floats(-1500, 1500), st.floats(-1500, 1500), st.integers(-1
 MIDDLE = st.sampled_from([WAYPOINT, WAYPOINT, WAYPOINT, TIME, TURNS, RTL, ROI])
 
 
-@settings(max_examples=200, deadline=None)
 @given(
     st.booleans(),
     st.lists(st.tuples(MIDDLE, steps), min_size=1, max_size=8),

@@ -4,7 +4,7 @@
 import math
 from dataclasses import replace
 
-from hypothesis import event, given, settings
+from hypothesis import event, given
 from hypothesis import strategies as st
 
 from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
@@ -80,7 +80,6 @@ profiles = st.builds(
 homes = st.sampled_from([None, (123, -456)])
 
 
-@settings(max_examples=600)
 @given(items=lists, profile=profiles, home=homes)
 def test_the_verdict_matches_the_document(
     items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
@@ -98,7 +97,6 @@ def test_the_verdict_matches_the_document(
         assert [record.pack() for record in verdict.records] == wanted
 
 
-@settings(max_examples=300)
 @given(items=plausible_lists(), profile=profiles, home=homes)
 def test_a_list_that_reads_back_can_be_sent_again_unchanged(
     items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
@@ -112,7 +110,6 @@ def test_a_list_that_reads_back_can_be_sent_again_unchanged(
         assert tuple(items_from_records(verdict.records, verdict.sent_as)) == verdict.items
 
 
-@settings(max_examples=300)
 @given(items=plausible_lists(), profile=profiles, home=homes)
 def test_every_difference_is_a_finding_and_every_finding_a_difference(
     items: list[MissionItem], profile: HarakiriRules, home: tuple[int, int] | None
@@ -144,7 +141,6 @@ def given_value(item: MissionItem, field: str) -> float:
     return 0 if value is None or math.isnan(value) else value
 
 
-@settings(max_examples=200)
 @given(items=lists.filter(lambda items: len(items) > 1))
 def test_item_by_item_and_whole_list_verdicts_agree(items: list[MissionItem]) -> None:
     profile = HarakiriRules()

@@ -218,7 +218,7 @@ wild = st.builds(
 
 
 @given(st.lists(wild, min_size=2, max_size=10))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionItem]) -> None:
     sent = [plan(1)[0], *items]
     if not check_list(sent, NavRules(inav_profile(limits=InavLimits()))).records:
