@@ -26,8 +26,8 @@ def name_of(row: Row) -> str:
 
 @pytest.mark.parametrize("row", TELEMETRY, ids=name_of)
 def test_each_message_on_the_page_matches_the_code(row: Row) -> None:
-    (line,) = re.findall(rf"^\| {name_of(row)} \| (.*) \|$", PAGE, re.MULTILINE)
-    after, rate, stream = line.split(" | ")
+    (line,) = re.findall(rf"^- {name_of(row)}: (.*)$", PAGE, re.MULTILINE)
+    after, rate, stream = line.rsplit(", ", 2)
     if row.msgid != m.MAVLINK_MSG_ID_HOME_POSITION and row.poll is not None:
         assert after.startswith(f"{row.poll.name} {row.poll.value}")
     assert rate == ("on request" if row.interval_s == inf else f"{1 / row.interval_s:g} Hz")
