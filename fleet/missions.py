@@ -103,7 +103,8 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
     if result is None:
         return
     findings = mission_findings(part(result, "findings"))
-    trial.corrections = tuple(correction_texts(findings))
+    assumed = text(result, "assumed")
+    trial.corrections = (*correction_texts(findings), *((f"Assumed: {assumed}",) if assumed else ()))
     trial.count, trial.checksum = whole(result, "count"), text(result, "checksum")
     match text(result, "result"):
         case "ACCEPTED":

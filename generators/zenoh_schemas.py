@@ -19,6 +19,7 @@ from protocols.mission_item import MissionItem
 from reports import vehicle_groups as groups
 from reports.finding import Finding
 from reports.vehicle_groups import Group, VehicleReport
+from reports.verdict import FlownLeg
 from storage.mission_store import MissionSummary
 
 SCHEMAS = Path(__file__).parents[1] / "payloads" / "schemas"
@@ -172,6 +173,8 @@ def _reply(upload: Json, items: Json, findings: Json) -> Json:
             "checksum": _CHECKSUM,
             "findings": findings,
             "flight": {"type": "string", "description": "its length, heights and end in words"},
+            "path": {"type": "array", "items": _of(FlownLeg), "description": "the legs flown, in m and degrees * 1e7"},
+            "assumed": {"type": "string", "description": "what the rules had to assume about board and craft"},
         }
     )
     status = {"type": "object", "required": ["state"], "description": "as `naze-bridge status --json`"}

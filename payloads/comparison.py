@@ -57,6 +57,8 @@ def checked_mission(items: Sequence[MissionItem], verdict: Json) -> Json:
     return {
         "verdict": verdict["result"],
         "flight": verdict["flight"],
+        "path": verdict["path"],
+        "assumed": verdict["assumed"],
         "findings": correction_texts(findings),
         "rows": [row.to_json() for row in sent_and_stored(items, stored, findings, verdict["sent_seqs"])],
         "rows_left_out": 0,

@@ -120,6 +120,8 @@ def verdict_data(verdict: Verdict[Any]) -> Json:
         "checksum": f"{identity.checksum:08x}",
         "findings": list(map(plain, verdict.findings)),
         "flight": ", ".join(verdict.flight),
+        "path": list(map(plain, verdict.path)),
+        "assumed": ", ".join(verdict.assumed),
     }
 
 

@@ -4,7 +4,7 @@
 import math
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Protocol
 
@@ -103,6 +103,12 @@ def degrees_to_e7(degrees: float) -> int | None:
     """Round degrees to 1e-7 degrees. Returns None if not a finite number (docs/mission-rules.md, "Each item")."""
     scaled = degrees * 1e7  # may overflow to infinity on its own
     return round(scaled) if math.isfinite(scaled) else None
+
+
+def behind_home(items: Iterable[MissionItem], home: MissionItem) -> list[MissionItem]:
+    """A list without home as one with it: every number is one higher, also the target of a jump."""
+    moved = [replace(item, seq=item.seq + 1, p1=item.p1 + (item.command == Command.DO_JUMP)) for item in items]
+    return [replace(home, seq=0), *moved]
 
 
 class MissionRecord(Protocol):

@@ -23,13 +23,30 @@ class Result(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class FlownLeg:
+    """A leg of the flight, for drawings. seq: of the item flown to, as read back; start, end: degrees * 1e7.
+
+    Heights are in metres above home, None if unknown. A landing is a leg without length.
+    """
+
+    seq: int
+    start: tuple[int, int]
+    end: tuple[int, int]
+    length_m: float
+    start_m: float | None
+    end_m: float | None
+    is_return: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict(Generic[RecordT]):
     """A checked list.
 
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
-    interest). `sent_seqs` has, for each of `items`, the number of the item as sent, or None if a speed change that was
-    inserted. `flight`: the length, heights and end in words. `findings` are in the order of the list. That of a
+    interest). `sent_seqs` has, for each of `items`, the number of the item as sent, or None if a speed change was
+    inserted. `flight`: the length, heights and end in words. `path`: the legs, also of a list rejected for them.
+    `assumed`: what the rules had to assume about board and craft. `findings` are in the order of the list. That of a
     rejection is the last.
     """
 
@@ -41,6 +58,8 @@ class Verdict(Generic[RecordT]):
     sent_as: Mapping[int, int] = field(default_factory=dict)
     sent_seqs: SentSeqs = ()
     flight: tuple[str, ...] = ()
+    path: tuple[FlownLeg, ...] = ()
+    assumed: tuple[str, ...] = ()
 
 
 def is_renumbered(sent_seqs: SentSeqs) -> bool:

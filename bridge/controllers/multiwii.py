@@ -58,6 +58,11 @@ class LegLimits:
     radius_cm: int
     stops_at_m: int
     highest_m: int
+    is_assumed: bool = False
+
+    def assumed(self) -> Sequence[str]:
+        values = f"safe_wp_distance = {self.stops_at_m}", f"nav_max_altitude = {self.highest_m}"
+        return values if self.is_assumed else ()
 
     def return_cm(self, rth: NavRecord, _here_cm: int | None, _highest_cm: int) -> int | None:
         """Its own RTH altitude is not known."""
@@ -79,13 +84,14 @@ class LegLimits:
 
 
 #: MultiWii's defaults.
-USUAL_LEGS = LegLimits(radius_cm=100, stops_at_m=500, highest_m=100)
+USUAL_LEGS = LegLimits(radius_cm=100, stops_at_m=500, highest_m=100, is_assumed=True)
 
 
 def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
     return NavProfile(
-        "MultiWii",
         capacity,
+        # Its defaults; a board reports its own (NAV_CONFIG).
+        USUAL_LEGS,
         endless_hold=(NavAction.POSHOLD_UNLIM, 0),
         sea_level=False,
         leg_speed=False,
@@ -95,8 +101,6 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         longest_hold=Range(0, 65, "it holds at most 65 s"),
         ends_on_any_record=False,
         own_rth_landing=True,
-        # The defaults. A board reports its own (NAV_CONFIG).
-        limits=USUAL_LEGS,
     )
 
 
@@ -199,5 +203,5 @@ PROFILE = Profile(
     missions=lambda board, vehicle, _: MultiwiiMissions(multiwii_profile(board.capacity), board, vehicle),
     settings=MspPartSettings,
     check_kind="multiwii",
-    rules=lambda settings: NavRules(multiwii_profile(settings.capacity or MULTIWII_CAPACITY)),
+    rules=lambda _: NavRules(multiwii_profile()),
 )

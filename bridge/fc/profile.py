@@ -118,11 +118,9 @@ NO_MISSIONS = Refusal(MissionResult.UNSUPPORTED, sentences.NO_MISSIONS())
 
 @dataclass(frozen=True, slots=True)
 class RuleSettings:
-    """The inputs of the mission rules. None: the firmware's default. capacity: records. saved: a board's settings."""
+    """The inputs of the mission rules. saved: a board's settings; None: the firmware's defaults."""
 
     takeoff_max_m: int
-    wp_radius_cm: int | None = None
-    capacity: int | None = None
     saved: SavedSettings | None = None
 
 

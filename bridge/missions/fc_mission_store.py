@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The interface between missions and the flight controllers that store them.
-
-Each kind of flight controller has its own way to write, verify and read a list back:
-`bridge.controllers.harakiri.mission_store` and `bridge.controllers.harakiri.mavlink_missions` are two.
-"""
+"""The interface between missions and the flight controllers that store them, each kind in its own way."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from bridge.model.ground_track import Place, distance_m
 from reports.finding import News
+from reports.verdict import FlownLeg
 
 #: Limits of our own, for boards that have none.
 PLAIN_LEG_M, PLAIN_AWAY_M, PLAIN_HEIGHT_M = 2000, 5000, 120
@@ -61,6 +62,7 @@ class Departure:
         self.place = craft if is_craft else home
         self.name = "the craft" if is_craft else "home"
         self.places = (craft, home)
+        self.assumed = ("the craft is at the list's home",) if craft is None and home is not None else ()
 
     def carried(self) -> Judgement:
         """Only from there is the list flown."""
@@ -94,7 +96,7 @@ class FlownPath:
 
     def __init__(self, legs: Sequence[Leg] = (), *, lands: bool = False, has_loops: bool = False) -> None:
         self.legs = legs
-        self._end = "lands" if lands else "does not land"
+        self._lands = lands
         self._has_loops = has_loops
         self.length_m, self.highest_cm = 0.0, 0
         for leg in legs:
@@ -109,7 +111,20 @@ class FlownPath:
             if leg.is_return:
                 words.append("returns home" if leg.end_cm is None else f"returns home at {leg.end_cm / 100:g} m")
                 break
-        return (*words, self._end)
+        return (*words, "lands" if self._lands else "does not land")
+
+    def shown(self, seqs: Sequence[int]) -> tuple[FlownLeg, ...]:
+        """For drawings; seqs: the number of the item of each record."""
+        shown: list[FlownLeg] = []
+        for leg in self.legs:
+            start, end = (leg.start.lat_e7, leg.start.lon_e7), (leg.end.lat_e7, leg.end.lon_e7)
+            start_m = None if leg.start_cm is None else leg.start_cm / 100
+            end_m = None if leg.end_cm is None else leg.end_cm / 100
+            shown.append(FlownLeg(seqs[leg.target], start, end, round(leg.length_m, 1), start_m, end_m, leg.is_return))
+        if shown and self._lands:
+            last = shown[-1]
+            shown.append(FlownLeg(last.seq, last.end, last.end, 0.0, last.end_m, 0.0))
+        return tuple(shown)
 
 
 def first_of(cases: Sequence[tuple[int, str]], field: str, news: News = News.DANGER) -> Iterable[Judgement]:

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from bridge.missions.flown_legs import Judgement
+from bridge.missions.flown_legs import FlownPath, Judgement
 from protocols.mavlink.dialect import command_name
-from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult
+from protocols.mission_item import MAX_LAT_E7, MAX_LON_E7, Command, Frame, MissionItem, MissionResult, behind_home
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import CLEARED_LIST, Verdict, rejected
 
@@ -59,6 +59,10 @@ class ListCheck(ABC):
         self._findings: list[Finding] = []
         self._rejection: RejectingFinding | None = None
         self._verdict: Verdict[Any] | None = None
+        #: The flight of the kept list, the item of each record, and what had to be assumed.
+        self._path = FlownPath()
+        self._seqs: Sequence[int] = ()
+        self._assumed: tuple[str, ...] = ()
 
     def take(self, item: MissionItem) -> RejectingFinding | None:
         """Check the next item. A rejection is final and is returned as soon as it is certain."""
@@ -74,7 +78,11 @@ class ListCheck(ABC):
             raise ValueError(f"{self._taken} of {self._count} items taken")
         if self._verdict is None:
             rejection = self._rejection or self._refuse_kept_list()
-            self._verdict = rejected(tuple(self._findings), rejection) if rejection else self._conclude()
+            if rejection:
+                verdict = rejected(tuple(self._findings), rejection)
+                self._verdict = replace(verdict, path=self._path.shown(self._seqs), assumed=self._assumed)
+            else:
+                self._verdict = self._conclude()
         return self._verdict
 
     @abstractmethod
@@ -225,6 +233,18 @@ def check_list(
         if check.take(item):
             break
     return check.finish()
+
+
+def with_home(items: Sequence[MissionItem], home: tuple[int, int] | None) -> Sequence[MissionItem]:
+    """The list with the home that a person gives: for a home without coordinates, or before a list without one."""
+    first = items[0]
+    if home is None:
+        return items
+    if first.command == Command.NAV_WAYPOINT and missing_coordinate(first):
+        return [replace(first, lat_e7=home[0], lon_e7=home[1]), *items[1:]]
+    if first.command == Command.NAV_WAYPOINT and first.frame not in (*RELATIVE_FRAMES, *TERRAIN_FRAMES):
+        return items
+    return behind_home(items, MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, *home, 0.0))
 
 
 def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding | None:

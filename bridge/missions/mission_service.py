@@ -41,7 +41,7 @@ from bridge.voice.happening import Happening
 from bridge.voice.mission_report import has_losses, summary, with_meant_home
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavStatus
-from reports.verdict import Result, SentSeqs, Verdict, is_renumbered
+from reports.verdict import FlownLeg, Result, SentSeqs, Verdict, is_renumbered
 
 T = TypeVar("T")
 
@@ -92,13 +92,14 @@ class HeldMission:
     """The flight controller's list, as last read.
 
     `sent_seqs`: the item numbers of each ground station that sent this list and has not read it since, by
-    Sender.identity. Only of those that count otherwise than `items`.
+    Sender.identity. Only of those that count otherwise than `items`. `path`: as it is flown, if that is known.
     """
 
     identity: ListIdentity
     records: tuple[Any, ...]
     items: tuple[MissionItem, ...]
     sent_seqs: Mapping[str, SentSeqs] = field(default_factory=dict)
+    path: tuple[FlownLeg, ...] = ()
 
 
 #: Ground stations whose own item numbers are remembered.
@@ -337,7 +338,7 @@ class MissionService:
         if arrived.sender and is_renumbered(verdict.sent_seqs):
             sent_seqs[arrived.sender] = verdict.sent_seqs
         newest = dict([*sent_seqs.items()][-_MOST_SENDERS:])
-        return HeldMission(identity, verdict.records, verdict.items, newest)
+        return HeldMission(identity, verdict.records, verdict.items, newest, verdict.path)
 
     def note_reader(self, reader: str, now: float) -> None:
         """A ground station (its Sender.identity) has read the list: from now on it counts the items as read."""
@@ -391,7 +392,9 @@ class MissionService:
             return self._refreshed(fc_store, self.held)
         known = (yield from recall(identity)) or RecalledMission()
         sent_seqs = {sender: seqs for sender, seqs in known.sent_seqs.items() if is_renumbered(seqs)}
-        held = HeldMission(identity, records, fc_store.items(records, known.sent_as), sent_seqs)
+        items = fc_store.items(records, known.sent_as)
+        path = check_list(items, report.rules, self.vehicle.place()).path
+        held = HeldMission(identity, records, items, sent_seqs, path)
         if fc_store is self.fc_store:
             # By the time the store answers, another flight controller may be connected.
             self.held = held

@@ -23,7 +23,7 @@ from protocols.mission_file.error import (
     refuse_decimal_comma,
     refuse_other_plans,
 )
-from protocols.mission_item import Command, Frame, MissionItem
+from protocols.mission_item import Command, Frame, MissionItem, behind_home
 from protocols.plain_text import shown
 
 _HEADER, _VERSIONS = ["QGC", "WPL"], ("100", "110", "120")
@@ -111,8 +111,8 @@ def _numbered(items: list[MissionItem], note: Note, *, has_home: bool) -> list[M
     """Number the items by their order, as Mission Planner does."""
     if not has_home or items[0].seq != 0:
         note(_NO_ITEM_0 if has_home else _NO_HOME)
-        items = items if has_home else [replace(item, seq=item.seq + 1) for item in items]
-        items = [replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0), *items]
+        home = replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0)
+        items = [home, *items] if has_home else behind_home(items, home)
     elif items[0].command == 0:
         note("home has command 0, treated as a WAYPOINT")
     if items[0].command == 0:

@@ -8,14 +8,10 @@ from typing import Any
 
 import click
 
-from bridge.controllers.harakiri.flight import MAX_LEG_M, USUAL_FLIGHT
-from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M, USUAL_CAPACITY, USUAL_WP_RADIUS_CM
-from bridge.controllers.inav.limits import SETTING_NAMES, InavLimits
-from bridge.controllers.multiwii import MULTIWII_CAPACITY, USUAL_LEGS
-from bridge.controllers.nav.rules import INAV_CAPACITY
+from bridge.controllers.inav.limits import SETTING_NAMES
 from bridge.controllers.table import PROFILES
 from bridge.fc.profile import RuleSettings
-from bridge.missions.list_check import MissionRules, check_list
+from bridge.missions.list_check import MissionRules, check_list, with_home
 from bridge.settings.parameter_names import parameter_names
 from payloads.mission_data import verdict_data
 from protocols.mission_file import MissionFileError
@@ -34,17 +30,6 @@ from terminal.sentences import complain, say
 #: The rules of each flight controller that stores missions.
 _RULES: Mapping[str, Callable[[RuleSettings], MissionRules]] = {
     profile.check_kind: profile.rules for profile in PROFILES if profile.check_kind and profile.rules
-}
-
-
-_INAV, _MULTIWII = InavLimits(), USUAL_LEGS
-#: The limits of a board's flight with default settings.
-_ASSUMED = {
-    "harakiri": f"mission flight, mission_first {USUAL_FLIGHT.mission_first} m, "
-    f"mission_height {USUAL_FLIGHT.mission_height} m, legs of at most {MAX_LEG_M} m",
-    "inav": f"nav_wp_max_safe_distance {_INAV.nav_wp_max_safe_distance} m, nav_max_altitude off, "
-    f"nav_rth_altitude {_INAV.nav_rth_altitude / 100:g} m, and the other defaults (--settings FILE gives yours)",
-    "multiwii": f"safe_wp_distance {_MULTIWII.stops_at_m} m, nav_max_altitude {_MULTIWII.highest_m} m",
 }
 
 
@@ -72,19 +57,6 @@ _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREA
     help="The firmware whose rules apply.",
 )
 @click.option(
-    "--wp-radius-cm",
-    type=click.IntRange(0, 2000),
-    default=USUAL_WP_RADIUS_CM,
-    show_default=True,
-    help="Harakiri's gps_wp_radius.",
-)
-@click.option(
-    "--capacity",
-    type=click.IntRange(2, 65535),
-    help=f"Number of records that fit. Default: Harakiri {USUAL_CAPACITY}, home included, INAV {INAV_CAPACITY}, "
-    f"MultiWii {MULTIWII_CAPACITY}.",
-)
-@click.option(
     "--settings",
     "settings_file",
     type=PATH,
@@ -93,16 +65,10 @@ _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREA
     "or a .param file.",
 )
 @click.option(
-    "--takeoff-max-m",
-    type=click.IntRange(2, 255),
-    show_default=f"of this machine's daemon, else {TAKEOFF_MAX_M}",
-    help="Harakiri's maximum take-off altitude.",
-)
-@click.option(
     "--home",
     metavar="LAT,LON",
     callback=position,
-    help="The craft's position, for files whose home has no coordinates.",
+    help="The craft's position, and home of a list without it: then item 0 in a relative frame is a waypoint.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each file.")
 @click.pass_context
@@ -111,10 +77,7 @@ def check(
     files: Sequence[Path],
     strict: bool,
     kind: str,
-    wp_radius_cm: int,
-    capacity: int | None,
     settings_file: Path | None,
-    takeoff_max_m: int | None,
     home: tuple[int, int] | None,
     as_json: bool,
 ) -> None:
@@ -126,18 +89,15 @@ def check(
     Nothing is sent anywhere. Exit code 1: a file would be rejected, 3: one would erase the mission.
     """
     try:
-        limit_m = takeoff_limit_m() if takeoff_max_m is None else takeoff_max_m
+        limit_m = takeoff_limit_m()
     except SettingsError as error:
-        raise click.UsageError(f"{error}; or give --takeoff-max-m") from error
+        raise click.UsageError(str(error)) from error
     saved = None if settings_file is None else _saved_settings(settings_file, kind)
     try:
-        rules = _RULES[kind](RuleSettings(limit_m, wp_radius_cm, capacity, saved))
+        rules = _RULES[kind](RuleSettings(limit_m, saved))
     except ValueError as error:
         raise click.UsageError(f"{settings_file}: {error}; save the settings again") from error
-    assumed = "" if saved else _ASSUMED.get(kind, "")
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
-    if assumed and not as_json and set(codes) != {ExitCode.UNREADABLE}:
-        say(f"Assumed, because no board was asked: {assumed}")
     ctx.exit(max(codes, key=_RANKS.index))
 
 
@@ -157,7 +117,7 @@ def _saved_settings(path: Path, kind: str) -> SavedSettings:
 def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:
     name = shown_path(path)
     try:
-        sent = load_mission(path)
+        sent = with_home(load_mission(path), home)
     except MissionFileError as error:
         if as_json:
             print_json({"file": name, "error": str(error)})
@@ -179,7 +139,12 @@ def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]
     click.secho(name, bold=True)
     if verdict.ack is not MissionResult.NO_SPACE:
         print_table(mission_table(sent, verdict.items, verdict.findings, verdict.sent_seqs))
-    say(f"{verdict.result.name}: {_summary(len(sent), verdict)}\n")
+    say(f"{verdict.result.name}: {_summary(len(sent), verdict)}")
+    if verdict.assumed:
+        say(f"Assumed: {', '.join(verdict.assumed)}")
+    if any(finding.seq == 0 and finding.field in ("frame", "command") for finding in verdict.findings):
+        say("If the list has no home, --home LAT,LON adds it")
+    say("")
 
 
 def _summary(sent: int, verdict: Verdict[Any]) -> str:

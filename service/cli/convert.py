@@ -2,14 +2,13 @@
 """`naze-bridge convert`: a mission file in another format, offline."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
-from bridge.missions.list_check import check_list
+from bridge.controllers.nav.rules import NavProfile
+from bridge.missions.list_check import check_list, with_home
 from protocols.mission_file import MissionFileError, write_mission_file
 from protocols.mission_file.nav_mission import write_nav_xml
 from protocols.mission_item import MissionItem
@@ -47,7 +46,9 @@ def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, in
         items = load_mission(source, alt_m)
         if alt_m is not None and any(item.alt_m != alt_m for item in items[1:]):
             raise click.UsageError(f"--alt is for a KML, GPX or CSV: {shown_path(source)} has altitudes of its own")
-        items[0] = _placed(items[0], home)
+        if not (items[0].lat_e7 and items[0].lon_e7):
+            home = home or (0, 0)  # which ground stations read as unknown
+        items = list(with_home(items, home))
         text = _nav_text(items) if ending in _NAV else write_mission_file(items, target.name)
         write_file(target, text, MissionFileError)
     except MissionFileError as error:
@@ -55,17 +56,9 @@ def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, in
     say(f"{len(items)} items, home included, written to {shown_path(target)}")
 
 
-def _placed(item: MissionItem, home: tuple[int, int] | None) -> MissionItem:
-    """Home with coordinates: its own, else those given, else 0, which ground stations read as unknown."""
-    if item.lat_e7 and item.lon_e7:
-        return item
-    lat_e7, lon_e7 = home or (0, 0)
-    return replace(item, lat_e7=lat_e7, lon_e7=lon_e7)
-
-
 def _nav_text(items: Sequence[MissionItem]) -> str:
     """The records that an INAV would store. Ends the program with status 1 if it would refuse the list."""
-    verdict = check_list(items, NavRules(inav_profile()), None)
+    verdict = check_list(items, NavRules(NavProfile()), None)
     records = [record for record in verdict.records if isinstance(record, NavRecord)]
     if verdict.findings:
         print_table(mission_table(items, verdict.items, verdict.findings, verdict.sent_seqs))

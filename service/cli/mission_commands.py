@@ -7,10 +7,11 @@ from pathlib import Path
 
 import click
 
+from bridge.missions.list_check import with_home
 from payloads.mission_data import ACCEPTED, Json, mission_findings, mission_items
 from protocols.mission_file import MissionFileError, write_mission_file, write_qgc_wpl
 from service.cli.daemon_client import BridgeClient, bridge_options
-from terminal.command_group import PATH
+from terminal.command_group import PATH, position
 from terminal.files import load_mission, shown_path, write_file
 from terminal.mission_table import mission_table
 from terminal.printing import print_json, print_table
@@ -23,16 +24,17 @@ _STANDARD_OUTPUT = Path("-")
 
 @click.command()
 @click.argument("file", type=PATH)
+@click.option("--home", metavar="LAT,LON", callback=position, help="Home, for a list without it.")
 @click.option("--erase", is_flag=True, help="Erase without asking if no item of the file can be stored.")
 @bridge_options
-def push(client: BridgeClient, file: Path, erase: bool) -> None:
+def push(client: BridgeClient, file: Path, home: tuple[int, int] | None, erase: bool) -> None:
     """Write a mission file to the flight controller and verify it there.
 
     Exit code 1: refused or failed, the old mission is kept; 3: no item of the file can be stored, and the mission was
     not erased.
     """
     try:
-        items = load_mission(file)
+        items = with_home(load_mission(file), home)
     except MissionFileError as error:
         fail(error, UNREADABLE)
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}

@@ -17,7 +17,7 @@ from starlette.routing import Route
 
 from bridge.settings.local_settings import by_parameter
 from payloads.comparison import shown, stored_mission
-from payloads.mission_data import ACCEPTED, Json, to_json
+from payloads.mission_data import ACCEPTED, Json, plain, to_json
 from protocols.param_file import write_param_file
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
@@ -116,9 +116,12 @@ class Api:
         """The mission as last read: an unauthenticated request must not use the flight controller's line."""
         held = self._daemon.bridge.missions.held
         if held is None:
-            return json_reply({"count": None, "checksum": None, "items": []})
+            return json_reply({"count": None, "checksum": None, "items": [], "path": []})
         identity, items = held.identity, [shown(item) for item in held.items]
-        return json_reply({"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items})
+        path = list(map(plain, held.path))
+        return json_reply(
+            {"count": identity.count, "checksum": f"{identity.checksum:08x}", "items": items, "path": path}
+        )
 
     async def _connect(self, _request: Request) -> Response:
         return json_reply(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))

@@ -9,7 +9,7 @@ import pytest
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
@@ -22,7 +22,7 @@ from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plan import HOME, PlanRow, as_items, stored_fields, waypoint
 from tests.support.programs import until
 
-RULES = NavRules(inav_profile())
+RULES = NavRules(NavProfile())
 #: Anticlockwise, as INAV stores it.
 _CORNERS = ((45.380, 8.470), (45.380, 8.480), (45.390, 8.480), (45.390, 8.470))
 FENCE = [PlanRow(5001, *corner, 0.0, p1=4.0) for corner in _CORNERS] + [PlanRow(5004, 45.385, 8.475, 0.0, p1=75.5)]

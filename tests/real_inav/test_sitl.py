@@ -11,7 +11,7 @@ import pytest
 
 from bridge.controllers.inav.limits import InavLimits
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.msp.inav_places import Corner, FenceAction, Geozone
 from protocols.msp.nav import LAST, NavAction, NavMode, NavRecord
@@ -40,7 +40,7 @@ def circle(north_m: float, radius_m: int, action: FenceAction, *, is_inclusive: 
 def said(records: Sequence[NavRecord], **limits: object) -> tuple[Result, list[str], list[str]]:
     """The verdict, dangers and all other texts for a craft on the field."""
     items = items_from_records(records, home_item((LAT_E7, LON_E7)))
-    rules = NavRules(inav_profile(limits=InavLimits(**limits)))  # type: ignore[arg-type]
+    rules = NavRules(NavProfile(limits=InavLimits(**limits)))  # type: ignore[arg-type]
     verdict = check_list(items, rules, (LAT_E7, LON_E7))
     dangers = [finding.text() for finding in verdict.findings if finding.news is News.DANGER]
     return verdict.result, dangers, [finding.text() for finding in verdict.findings]
@@ -164,7 +164,7 @@ def test_a_return_lands_only_if_the_param1_says_so(sitl: Sitl, lands: bool) -> N
     sitl.run(70)
     assert sitl.is_armed() != lands
     items = items_from_records(ended(records), home_item((LAT_E7, LON_E7)))
-    flight = check_list(items, NavRules(inav_profile()), (LAT_E7, LON_E7)).flight
+    flight = check_list(items, NavRules(NavProfile()), (LAT_E7, LON_E7)).flight
     assert flight[-1] == ("lands" if lands else "does not land")
 
 

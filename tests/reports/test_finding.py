@@ -8,7 +8,7 @@ import pytest
 
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from bridge.voice.mission_report import finding_lines, has_losses, summary
 from reports.finding import DROPPED, REJECTED, Finding, News
@@ -114,7 +114,7 @@ def test_a_list_without_home_reports_the_first_item_as_home() -> None:
 
 
 def test_a_leg_below_home_is_not_counted_as_raised() -> None:
-    verdict = check_list(mission(item(WAYPOINT, alt_m=-5.0), item(WAYPOINT, alt_m=0.0)), NavRules(inav_profile()))
+    verdict = check_list(mission(item(WAYPOINT, alt_m=-5.0), item(WAYPOINT, alt_m=0.0)), NavRules(NavProfile()))
     assert summary(3, verdict) == "3 of 3 stored: 1 Alt raised, 1 flown differently"
 
 

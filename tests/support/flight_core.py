@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ctypes import c_char_p, c_int, c_int32, c_uint16
 from pathlib import Path
 
-from bridge.controllers.harakiri.flight import FlightLimits
+from bridge.controllers.harakiri.check import FlightLimits
 from protocols.mission_item import pack_records
 from protocols.msp.mission import WpRecord
 from protocols.msp.mission_flight import FlightReason

@@ -6,13 +6,13 @@ from typing import Any
 
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
 from reports.verdict import Result, Verdict
 
-INAV, MULTIWII = NavRules(inav_profile()), NavRules(multiwii_profile())
+INAV, MULTIWII = NavRules(NavProfile()), NavRules(multiwii_profile())
 LAT, LON = 453838000, 84733000
 A = NavAction
 C = Command

@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from bridge.controllers.inav.platforms import PLATFORMS, MissionPart, Platform, PlatformEffect
+from bridge.controllers.inav.limits import PLATFORMS, MissionPart, Platform, PlatformEffect
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem
 from protocols.msp.nav import NavAction, NavRecord
 from reports.finding import News
 from reports.verdict import Result, Verdict
 
-RULES = {"inav": NavRules(inav_profile()), "multiwii": NavRules(multiwii_profile())}
+RULES = {"inav": NavRules(NavProfile()), "multiwii": NavRules(multiwii_profile())}
 LAT, LON = 453838000, 84733000
 #: About 20 m to the north.
 STEP = 1800

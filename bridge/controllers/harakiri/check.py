@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules for a Harakiri's mission list (docs/mission-rules.md)."""
+"""The rules for a Harakiri's mission list (docs/mission-rules.md).
+
+A list that is kept is also judged as the flight core flies it, and refuses it in the air (firmware/naze_flight.c,
+check_record).
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bridge.controllers.harakiri.flight import PLACED, USUAL_FLIGHT, FlightLimits, fly, low_returns
 from bridge.controllers.harakiri.rules import (
     CRUISE,
     NO_ROI_KNOWN,
@@ -19,8 +22,16 @@ from bridge.controllers.harakiri.rules import (
     command_rules,
     items_from_records,
 )
-from bridge.fc.profile import RuleSettings
-from bridge.missions.flown_legs import Departure, FlownPath, Judgement, Point, beyond_plain_limits
+from bridge.missions.flown_legs import (
+    Departure,
+    FlownPath,
+    Judgement,
+    Leg,
+    Point,
+    beyond_plain_limits,
+    first_of,
+    in_metres,
+)
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -32,11 +43,96 @@ from bridge.missions.list_check import (
     refuse_frame,
     refuse_position,
 )
+from bridge.model.ground_track import Place, distance_m
 from protocols.mavlink.dialect import command_name
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
 from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
 from reports.verdict import Result, Verdict
+
+#: NF_MAX_LEG_M, and NF_TAKEOFF_LEAST_M, also of legs, and NF_TAKEOFF_MOST_M.
+MAX_LEG_M, LEAST_M, TAKEOFF_MOST_M = 2000, 2, 15
+PLACED = (WpCommand.WAYPOINT, WpCommand.LOITER_UNLIM, WpCommand.LOITER_TURNS, WpCommand.LOITER_TIME)
+_WITHOUT_HEIGHT = (WpCommand.LAND, WpCommand.SETROI)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """The settings of a Harakiri with mission flight that decide about a list, and their defaults: metres."""
+
+    mission_first: int = 200
+    mission_height: int = 100
+    #: 0: any distance from home.
+    mission_radius: int = 0
+    is_assumed: bool = False
+
+    def assumed(self) -> tuple[str, ...]:
+        return "mission flight", f"mission_first = {self.mission_first}", f"mission_height = {self.mission_height}"
+
+    def judge(self, records: Sequence[WpRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
+        """The core compares whole metres, rounded down."""
+        long, high, limited, outside = [], [], [], []
+        home = departure.place or departure.home
+        for leg in path.legs:
+            off_m = 0.0 if home is None else distance_m(home, leg.end)
+            if 0 < self.mission_radius < int(off_m):
+                why = f"not flown: {in_metres(off_m)} off, mission_radius {self.mission_radius} m"
+                outside.append((leg.target, why))
+            elif leg.is_first and int(leg.length_m) > self.mission_first:
+                why = f"not flown: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
+                if departure.home is not None and int(distance_m(departure.home, leg.end)) <= self.mission_first:
+                    why = f"starts only at the list's home, {in_metres(leg.length_m)} off"
+                yield Judgement(leg.target, "lat_e7", why)
+            elif int(leg.length_m) > MAX_LEG_M:
+                long.append((leg.target, f"not flown: {in_metres(leg.length_m)} leg, at most 2 km"))
+        for place, record in enumerate(records):
+            if not place or record.command in _WITHOUT_HEIGHT:
+                continue
+            if (flown_m := _flown_m(record)) > self.mission_height:
+                high.append((place, f"not flown: {flown_m} m, mission_height {self.mission_height}"))
+            elif flown_m != record.height_m:
+                limited.append((place, f"{record.height_m} m is flown at {flown_m} m"))
+        yield from first_of(limited, "alt_m", News.WARNING)
+        yield from first_of(long, "lat_e7")
+        yield from first_of(outside, "lat_e7")
+        yield from first_of(high, "alt_m")
+
+
+USUAL_FLIGHT = FlightLimits(is_assumed=True)
+
+
+def _flown_m(record: WpRecord) -> int:
+    height_m = max(record.height_m, LEAST_M)
+    return min(height_m, TAKEOFF_MOST_M) if record.command == WpCommand.TAKEOFF else height_m
+
+
+def fly(records: Sequence[WpRecord], departure: Departure) -> FlownPath:
+    """The way of the records. The first is the list's home. RETURN_TO_LAUNCH leads to the place of arming."""
+    legs: list[Leg] = []
+    here: Place | None = departure.place
+    here_cm = None
+    for place, record in enumerate(records[1:], 1):
+        if record.command == WpCommand.TAKEOFF:
+            here_cm = 100 * _flown_m(record)
+        end = record if record.command in PLACED else departure.place
+        if end is None or not (record.command in PLACED or record.command == WpCommand.RETURN_TO_LAUNCH):
+            continue
+        end_cm = 100 * max(record.height_m, LEAST_M)
+        is_return = record.command == WpCommand.RETURN_TO_LAUNCH
+        start_cm = end_cm if here_cm is None else here_cm
+        start = here or end
+        length_m = 0.0 if start is end else distance_m(start, end)
+        legs.append(Leg(place, place, start, end, length_m, start_cm, end_cm, not legs, is_return))
+        here, here_cm = end, end_cm
+    return FlownPath(legs, lands=records[-1].command == WpCommand.LAND)
+
+
+def low_returns(path: FlownPath) -> Iterable[Judgement]:
+    """Returns below the highest leg."""
+    for leg in path.legs:
+        if leg.is_return and leg.end_cm is not None and leg.end_cm < path.highest_cm:
+            why = f"RTL flies home at {leg.end_cm / 100:g} m, below the {path.highest_cm / 100:g} m"
+            yield Judgement(leg.target, "alt_m", why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +158,6 @@ class HarakiriRules:
         return HarakiriCheck(self, count, fallback_home)
 
 
-def harakiri_rules(settings: RuleSettings) -> HarakiriRules:
-    """The mission rules; missing settings are those of a board with the defaults."""
-    radius_cm = USUAL_WP_RADIUS_CM if settings.wp_radius_cm is None else settings.wp_radius_cm
-    return HarakiriRules(settings.capacity or USUAL_CAPACITY, radius_cm, settings.takeoff_max_m)
-
-
 class HarakiriCheck(ListCheck):
     """The check of one list. `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates.
 
@@ -85,7 +175,6 @@ class HarakiriCheck(ListCheck):
         self._records: list[WpRecord] = []
         self._roi_commands: dict[int, int] = {}
         self._flight = rules.flight
-        self._path = FlownPath()
         self._raised_returns: set[int] = set()
 
     def _judge(self, item: MissionItem) -> RejectingFinding | None:
@@ -111,8 +200,10 @@ class HarakiriCheck(ListCheck):
             tuple(items_from_records(self._records, self._roi_commands)),
             findings,
             self._roi_commands,
-            tuple(item.seq for item, _ in self._kept),
+            tuple([item.seq for item, _ in self._kept]),
             self._path.facts(),
+            self._path.shown(self._seqs),
+            self._assumed,
         )
 
     def _refuse(self, item: MissionItem, rule: CommandRule | None) -> RejectingFinding | None:
@@ -257,6 +348,10 @@ class HarakiriCheck(ListCheck):
                 break
         departure = Departure(Point(*craft) if craft else None, home, first=first)
         self._path = path = fly(self._records, departure)
+        self._seqs = range(len(self._records))
+        self._assumed = departure.assumed
+        if self._flight is not None and self._flight.is_assumed:
+            self._assumed += self._flight.assumed()
         if departure.carried_m:
             yield departure.carried()
         if self._flight is None:

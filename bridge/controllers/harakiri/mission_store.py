@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from zlib import crc32
 
-from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.flight import USUAL_FLIGHT, FlightLimits
+from bridge.controllers.harakiri.check import USUAL_FLIGHT, FlightLimits, HarakiriRules
 from bridge.controllers.harakiri.rules import items_from_records
 from bridge.controllers.harakiri.settings import read_by_name
 from bridge.fc.profile import FlightController, RuleSettings
@@ -115,7 +114,10 @@ class HarakiriMissions(_HarakiriStore):
         if self._vehicle.last_flight is None:
             return None
         values = yield from read_by_name(self._places, "mission_first", "mission_height", "mission_radius")
-        return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))
+        if values is None:
+            return USUAL_FLIGHT
+        first_m, height_m, radius_m = map(int, values)
+        return FlightLimits(first_m, height_m, radius_m)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list: BEGIN, CHUNKs, COMMIT; verified by the checksum over the flash."""

@@ -6,7 +6,7 @@ Disarmed it speaks MSP. Armed, the setting tele_prot decides: MSP (0), FrSky tel
 
 from dataclasses import replace
 
-from bridge.controllers.harakiri.check import harakiri_rules
+from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
 from bridge.controllers.harakiri.mission_store import HarakiriArmedMissions, HarakiriMissions
 from bridge.controllers.harakiri.settings import HarakiriFcSettings
@@ -86,7 +86,7 @@ PATCHED = Profile(
     decoders=FLIGHT_DECODERS,
     acc_axes=_ACC_AXES,
     check_kind="harakiri",
-    rules=harakiri_rules,
+    rules=lambda settings: HarakiriRules(takeoff_max_m=settings.takeoff_max_m),
     restarts_after_calibration=True,
     arming_blockers=arming_blockers,
 )

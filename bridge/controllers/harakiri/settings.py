@@ -23,7 +23,7 @@ from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from protocols.msp import mission as ext
-from protocols.msp.frame import FRAME_OVERHEAD, Direction
+from protocols.msp.frame import FRAME_OVERHEAD
 from protocols.msp.mission import InfoFlag, MissionCommand, ReplyStatus
 from protocols.msp.setting_table import (
     TABLE_REQUEST,
@@ -99,20 +99,10 @@ class HarakiriFcSettings(FcSettings):
 
     def __init__(self, board: FlightController) -> None:
         self._modes = MspPartSettings(board, BOXES)
-        #: For a build with an earlier mission extension.
-        self._parts = MspPartSettings(board)
-        self._lists_all: bool | None = None
         self._reply: SettingsReply | None = None
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """The values of the previous table if their checksum is still the board's: then that is three requests."""
-        if self._lists_all is None:
-            reply = yield from ask_surely(TABLE_REQUEST, SettingCommand.SETTING, _TABLE_SIZE)
-            if reply is None:
-                return None
-            self._lists_all = reply.direction is Direction.REPLY
-        if not self._lists_all:
-            return (yield from self._parts.read(previous, reading))
         listed = None if previous is None else _listed(previous)
         for _ in range(_READINGS):
             whole = yield from _whole()
@@ -154,8 +144,6 @@ class HarakiriFcSettings(FcSettings):
         return (_shown(number, reply.settings[0]),)
 
     def save(self) -> Conversation[SettingRefusal | None]:
-        if not self._lists_all:
-            return (yield from self._parts.save())
         for _ in range(_SAVES):
             whole = yield from _whole()
             if whole is None:

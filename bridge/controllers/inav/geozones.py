@@ -113,9 +113,6 @@ class InavGeozones(InavPlaceStore[Geozone]):
     def _rules(self) -> "FenceRules":
         return FenceRules(self._known or (), is_feature_on=self._is_in_force)
 
-    def _whole(self, records: tuple[Geozone, ...]) -> tuple[Geozone, ...]:
-        return records
-
     def _write(self, wanted: tuple[Geozone, ...], held: tuple[Geozone, ...]) -> Conversation[bool]:
         """Free the vertices of all zones that change before any new one needs them."""
         for zone in held:

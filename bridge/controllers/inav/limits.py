@@ -1,26 +1,112 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of an INAV that decide whether it arms with a mission, and how it flies it (docs/inav.md).
+"""The settings and the platform of an INAV decide whether it arms with a mission, and how it flies it (docs/inav.md).
 
-From navigationIsBlockingArming, updateClimbRateToAltitudeController, updateDesiredRTHAltitude,
+Sources of the platforms' table are lines of INAV 9.1.0 (src/main), or flights of tests/real_inav/test_sitl.py; the
+settings' are navigationIsBlockingArming, updateClimbRateToAltitudeController, updateDesiredRTHAltitude,
 navigationRTHAllowsLanding and findNearestSafeHome (src/main/navigation/navigation.c, 6.1.1 to 9.1.0).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
-from typing import Any
+from enum import Enum, IntEnum
+from typing import Any, NamedTuple
 
-from bridge.controllers.inav.platforms import Platform, flown_otherwise
 from bridge.controllers.inav.safehomes import approach_text
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.flown_path import above_home_cm
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
+from bridge.model.craft import Airframe
 from bridge.model.ground_track import Place, distance_m
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
-from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
+from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
 from protocols.msp.nav_items import leg_speed
 from protocols.settings_file import SavedSettings
 from reports.finding import News
+
+
+class Platform(Enum):
+    """The platforms whose missions differ, by the words for them."""
+
+    MULTIROTOR = "a multirotor"
+    AEROPLANE = "an aeroplane"
+    ROVER = "a rover"
+    BOAT = "a boat"
+
+
+class MissionPart(Enum):
+    """its name in the table, and the field of the item that a message names."""
+
+    SPEED = "speed of a leg", "command"
+    HEIGHT = "height of a leg", "alt_m"
+    HOLD = "LOITER_TIME, LOITER_UNLIM", "command"
+    TURN = "CONDITION_YAW, ROI", "command"
+    LANDING = "LAND, RTL that lands", "command"
+
+
+class PlatformEffect(NamedTuple):
+    """How it is flown, in a message's words; empty: as sent. source: where that is known from."""
+
+    why: str
+    source: str
+    news: News = News.WARNING
+
+
+_ON_THE_GROUND = {
+    MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_rover_boat.c:130: cruise throttle"),
+    MissionPart.HEIGHT: PlatformEffect("Alt: no effect on {}", "flight/mixer.c:171: no altitude control", News.NOTICE),
+    MissionPart.HOLD: PlatformEffect("{} drives on while it holds", "navigation_rover_boat.c:119: stops at the end"),
+    MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),
+    MissionPart.LANDING: PlatformEffect("{} disarms there", "navigation.c:1896", News.NOTICE),
+}
+PLATFORMS: Mapping[Platform, Mapping[MissionPart, PlatformEffect]] = {
+    Platform.MULTIROTOR: {
+        MissionPart.SPEED: PlatformEffect("", "up to nav_max_auto_speed: flown"),
+        MissionPart.HEIGHT: PlatformEffect("", "flown"),
+        MissionPart.HOLD: PlatformEffect("", "navigation.c:2106"),
+        MissionPart.TURN: PlatformEffect("", "navigation.c:2050"),
+        MissionPart.LANDING: PlatformEffect("", "flown"),
+    },
+    Platform.AEROPLANE: {
+        MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_multicopter.c:734 only"),
+        MissionPart.HEIGHT: PlatformEffect("", "navigation_fixedwing.c:136"),
+        MissionPart.HOLD: PlatformEffect("{} circles there", "navigation_fixedwing.c:324", News.NOTICE),
+        MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),
+        MissionPart.LANDING: PlatformEffect("", "by its FW approach, see below"),
+    },
+    Platform.ROVER: _ON_THE_GROUND,
+    Platform.BOAT: _ON_THE_GROUND,
+}
+_BY_AIRFRAME = {
+    Airframe.FIXED_WING: Platform.AEROPLANE,
+    Airframe.ROVER: Platform.ROVER,
+    Airframe.BOAT: Platform.BOAT,
+}
+
+
+def platform_of(airframe: Airframe | None) -> Platform:
+    return Platform.MULTIROTOR if airframe is None else _BY_AIRFRAME.get(airframe, Platform.MULTIROTOR)
+
+
+def flown_otherwise(records: Sequence[NavRecord], platform: Platform) -> Iterable[Judgement]:
+    """One judgement about each part that this platform ignores or flies differently."""
+    for part, effect in PLATFORMS[platform].items():
+        if effect.why:
+            why = effect.why.format(platform.value)
+            cases = [(place, why) for place, record in enumerate(records) if part in _parts(record)]
+            yield from first_of(cases, part.value[1], effect.news)
+
+
+def _parts(record: NavRecord) -> Iterable[MissionPart]:
+    if record.action in LEGS:
+        yield MissionPart.HEIGHT
+        if leg_speed(record, 0):
+            yield MissionPart.SPEED
+    if record.action == NavAction.POSHOLD_TIME:
+        yield MissionPart.HOLD
+    if record.action in TURNS and record.p1 >= 0:
+        yield MissionPart.TURN
+    if record.action == NavAction.LAND or (record.action == NavAction.RTH and record.p1):
+        yield MissionPart.LANDING
 
 
 class RthAltMode(IntEnum):
@@ -48,7 +134,8 @@ class InavLimits:
 
     Their defaults are INAV's; 0 turns the first, nav_max_altitude and nav_wp_enforce_altitude off.
     zones: those in force; none without the feature GEOZONE. selected: the mission that was selected, from 1, if there
-    are several. approach: an aeroplane's to the LAND of the new list, or None before 7.1.
+    are several. approach: an aeroplane's to the LAND of the new list, or None before 7.1. unknown: settings whose
+    default is assumed.
     """
 
     nav_wp_max_safe_distance: int = 100
@@ -65,10 +152,15 @@ class InavLimits:
     selected: int = 1
     platform: Platform = Platform.MULTIROTOR
     approach: FwApproach | None = None
+    unknown: tuple[str, ...] = ("nav_wp_max_safe_distance", "nav_max_altitude", "nav_rth_altitude")
 
     def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
         """With these settings. Raises ValueError for one that is neither a number nor one of its choices."""
-        return replace(self, **{name: _number(name, values[name]) for name in SETTING_NAMES if name in values})
+        given = {name: _number(name, values[name]) for name in SETTING_NAMES if name in values}
+        return replace(self, **given, unknown=tuple(name for name in self.unknown if name not in values))
+
+    def assumed(self) -> Sequence[str]:
+        return [f"{name} = {getattr(self, name)}" for name in self.unknown]
 
     def return_cm(self, _rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
         if self.nav_rth_alt_mode == RthAltMode.FIXED:
@@ -189,7 +281,7 @@ _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "zones", "selected", "platform", "approach")
+_OTHER_FIELDS = ("safehomes", "zones", "selected", "platform", "approach", "unknown")
 #: Those that decide if a list is flown, and how high and fast.
 DECISIVE_NAMES = (
     *("nav_wp_max_safe_distance", "nav_max_altitude", "nav_wp_enforce_altitude"),

@@ -12,8 +12,7 @@ from itertools import chain
 
 from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
-from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits
-from bridge.controllers.inav.platforms import Platform, platform_of
+from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits, Platform, platform_of
 from bridge.controllers.inav.safehomes import read_approaches, read_safehomes, with_approaches, write_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.inav.zone_check import zone_ahead
@@ -202,7 +201,7 @@ class InavMissions(NavMissions, FliesToItems):
         if values is None or safehomes is None or zones is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform)
+            limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform, unknown=())
             self._limits = limits.with_settings(values)
 
     def _read_decisive_limits(self) -> Conversation[None]:

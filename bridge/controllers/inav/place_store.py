@@ -5,7 +5,7 @@ The old ones stay in its flash until the new ones are read back equal. If they a
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from bridge.fc.fc_settings import write_eeprom
 from bridge.fc.profile import FlightController
@@ -19,7 +19,6 @@ from bridge.missions.fc_mission_store import (
     StoreState,
 )
 from bridge.missions.list_check import MissionRules
-from protocols.mission_item import MissionItem
 from protocols.msp.frame import Direction, request
 from reports.verdict import RecordT
 
@@ -72,16 +71,12 @@ class InavPlaceStore(FcMissionStore[RecordT]):
         return 0
 
     @abstractmethod
-    def items(self, records: Sequence[RecordT], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """The list as a ground station reads it."""
-
-    @abstractmethod
     def _rules(self) -> MissionRules:
         """The rules for a new list."""
 
-    @abstractmethod
     def _whole(self, records: tuple[RecordT, ...]) -> tuple[RecordT, ...]:
         """The list as it is read back. Of an empty one, what clears it."""
+        return records
 
     @abstractmethod
     def _write(self, wanted: tuple[RecordT, ...], held: tuple[RecordT, ...]) -> Conversation[bool]:

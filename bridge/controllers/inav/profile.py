@@ -10,7 +10,7 @@ from bridge.controllers.inav.safehomes import InavSafehomes
 from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.inav.telemetry import INAV_DECODERS, INAV_POLLS, arming_blockers
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import INAV_CAPACITY, inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.profile import SILENCE_WITH_H7_S, FlightController, Interview, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS
@@ -69,10 +69,10 @@ PROFILE = Profile(
     # The serial task runs 100 times a second (fc_tasks.c).
     turn_s=0.01,
     silence_s=SILENCE_WITH_H7_S,
-    missions=lambda board, vehicle, _: InavMissions(inav_profile(board.capacity), board, vehicle),
+    missions=lambda board, vehicle, _: InavMissions(NavProfile(board.capacity), board, vehicle),
     fences=lambda board, _vehicle: InavGeozones(board) if has_zones(board) else NO_PLACES,
     rally=lambda board, _vehicle: InavSafehomes(board),
     settings=InavFcSettings,
     check_kind="inav",
-    rules=lambda settings: NavRules(inav_profile(settings.capacity or INAV_CAPACITY, saved_limits(settings.saved))),
+    rules=lambda settings: NavRules(NavProfile(limits=saved_limits(settings.saved))),
 )

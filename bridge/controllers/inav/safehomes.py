@@ -162,9 +162,6 @@ class RallyCheck(ListCheck):
     def _conclude(self) -> Verdict[Safehome]:
         if not self._places:
             return CLEARED_LIST
-        off = sum(not each.enabled and bool(each.lat_e7 or each.lon_e7) for each in self._current)
-        if off:
-            self._say(f"Safehomes that were off are erased: {off}", News.WARNING)
         records = self._fill()
         findings = tuple(self._findings)
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, rally_items(records), findings)

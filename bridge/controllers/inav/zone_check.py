@@ -24,7 +24,9 @@ _AHEAD_M = 200
 def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
     blocked = [_blocks_arming(zones, place) for place in departure.places if place is not None]
     if blocked and blocked[0]:
-        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", _weight(blocked))
+        # A list is rejected only if INAV would arm neither where the craft is nor at the list's home.
+        news = None if all(blocked) else News.DANGER
+        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", news)
     for zone in zones:
         if not zone.is_inclusive:
             through = [leg for leg in path.legs if _shares_height(zone, leg) and any(_insides([zone], leg))]
@@ -59,18 +61,18 @@ def _border_m(zone: Geozone, place: Place) -> float:
     return min(passing_distance_m(*side, place) for side in pairwise((*zone.corners, zone.corners[0])))
 
 
-def _weight(blocked: Sequence[str]) -> News | None:
-    """A list is rejected only if INAV would arm neither where the craft is nor at the list's home."""
-    return None if all(blocked) else News.DANGER
-
-
 def _blocks_arming(zones: Sequence[Geozone], place: Place) -> str:
     """Where the place is if INAV does not arm there, else empty."""
     inside = [zone for zone in zones if zone.lowest_cm <= 0 and _is_inside(zone, place)]
     for zone in inside:
         if not zone.is_inclusive:
             return f"in geozone {zone.number}"
-    near = [zone for zone in zones if zone.is_inclusive and _distance_m(zone, place) <= _IGNORED_M]
+    near = [
+        zone
+        for zone in zones
+        if zone.is_inclusive
+        and min(distance_m(corner, place) for corner in zone.corners) - zone.radius_cm / 100 <= _IGNORED_M
+    ]
     return "" if inside or not near else f"outside geozone {near[0].number}"
 
 
@@ -80,11 +82,6 @@ def _shares_height(zone: Geozone, leg: Leg) -> bool:
         return True
     is_above = zone.highest_cm and min(leg.start_cm, leg.end_cm) > zone.highest_cm
     return not (is_above or (zone.lowest_cm and max(leg.start_cm, leg.end_cm) < zone.lowest_cm))
-
-
-def _distance_m(zone: Geozone, place: Place) -> float:
-    """To the nearest corner, or to a circle's border."""
-    return min(distance_m(corner, place) for corner in zone.corners) - zone.radius_cm / 100
 
 
 def _is_inside(zone: Geozone, place: Place) -> bool:

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import ClassVar
 
 from bridge.controllers.nav.flown_path import flown_size, fly, jump_within_jump, lands_after_rth
 from bridge.controllers.nav.related_items import Jumps, LegSpeed, placed_landing
@@ -20,7 +21,7 @@ from bridge.controllers.nav.rules import (
     NavRule,
 )
 from bridge.controllers.nav.unshown import flies_home, keep_unshown
-from bridge.missions.flown_legs import Departure, FlownPath, Point, beyond_plain_limits
+from bridge.missions.flown_legs import Departure, Point, beyond_plain_limits
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
     TERRAIN_FRAMES,
@@ -35,7 +36,7 @@ from bridge.missions.list_check import (
 from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
-from protocols.msp.nav_items import GROUND_SPEED, home_item, items_from_records, sent_seqs
+from protocols.msp.nav_items import GROUND_SPEED, home_item, item_seqs, items_from_records, sent_seqs
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import Result, Verdict
 
@@ -47,13 +48,10 @@ _MAX_HEIGHT_CM = 3_276_700
 class NavRules:
     """The rules of one flight controller. current: the current list. others: the other missions in its store."""
 
+    has_home: ClassVar[bool] = True
     profile: NavProfile
     current: Mission = ()
     others: tuple[Mission, ...] = ()
-
-    @property
-    def has_home(self) -> bool:
-        return True
 
     @property
     def max_items(self) -> int:
@@ -77,7 +75,6 @@ class NavCheck(ListCheck):
         self._fallback_home = fallback_home
         self._home = home_item(fallback_home)
         self._has_home = False
-        self._path = FlownPath()
         self._records: list[NavRecord] = []
         #: The item of each record.
         self._sent: list[MissionItem] = []
@@ -253,6 +250,8 @@ class NavCheck(ListCheck):
         limits, departure = self._profile.limits, self._departure()
         lands = lands_after_rth(self._records)
         self._path = path = fly(self._records, departure, limits, lands=lands)
+        self._seqs = item_seqs(self._records)
+        self._assumed = (*departure.assumed, *(limits.assumed() if limits else ()))
         plain = beyond_plain_limits(path, departure)
         judgements = limits.judge(self._records, path, departure) if limits else plain
         if departure.carried_m:
@@ -284,8 +283,8 @@ class NavCheck(ListCheck):
             )
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
-        flight = self._path.facts()
-        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as, seqs, flight)
+        flight = self._path.facts(), self._path.shown(self._seqs), self._assumed
+        return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, records, items, findings, self._sent_as, seqs, *flight)
 
     def _keep(self, item: MissionItem, record: NavRecord) -> None:
         if record.action in LEGS:

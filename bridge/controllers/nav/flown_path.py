@@ -21,6 +21,9 @@ class BoardLimits(Protocol):
     def return_cm(self, rth: NavRecord, here_cm: int | None, highest_cm: int) -> int | None:
         """The height of a return that begins at `here_cm`, or None if unknown."""
 
+    def assumed(self) -> Sequence[str]:
+        """Each of them that is only assumed, with its value."""
+
     def judge(self, records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         """Whether, and how differently, the board flies these records."""
 

@@ -21,7 +21,7 @@ HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 
 @dataclass(frozen=True, slots=True)
 class NavProfile:
-    """The differences between INAV and MultiWii NAV.
+    """The differences between INAV, whose values are the defaults, and MultiWii NAV. INAV stores no POSHOLD_UNLIM.
 
     capacity: records, without home. endless_hold: action and p1 of an endless hold. sea_level: altitudes may refer to
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
@@ -30,39 +30,21 @@ class NavProfile:
     decides if it lands, else the last record's p1 does. limits: its own settings; None: unknown.
     """
 
-    name: str
-    capacity: int
-    endless_hold: tuple[NavAction, int]
-    sea_level: bool
-    leg_speed: bool
-    rth_height: bool
-    jumps_back_only: bool
-    longest_hold: Range
-    ends_on_any_record: bool
-    own_rth_landing: bool
+    capacity: int = INAV_CAPACITY
     limits: BoardLimits | None = None
+    endless_hold: tuple[NavAction, int] = (NavAction.POSHOLD_TIME, ENDLESS_S)
+    sea_level: bool = True
+    leg_speed: bool = True
+    rth_height: bool = False
+    jumps_back_only: bool = False
+    longest_hold: Range = HOLD
+    ends_on_any_record: bool = True
+    own_rth_landing: bool = False
 
     @property
     def max_items(self) -> int:
         """The longest list that may fit: every record with a change of speed before it, and home."""
         return (2 if self.leg_speed else 1) * self.capacity + 1
-
-
-def inav_profile(capacity: int = INAV_CAPACITY, limits: BoardLimits | None = None) -> NavProfile:
-    """INAV. It does not store a POSHOLD_UNLIM."""
-    return NavProfile(
-        "INAV",
-        capacity,
-        endless_hold=(NavAction.POSHOLD_TIME, ENDLESS_S),
-        sea_level=True,
-        leg_speed=True,
-        rth_height=False,
-        jumps_back_only=False,
-        longest_hold=HOLD,
-        ends_on_any_record=True,
-        own_rth_landing=False,
-        limits=limits,
-    )
 
 
 class AltitudeUse(Enum):

@@ -11,7 +11,7 @@ const STEP_DEG = 1e-5; // about 1 m
 export class HeldMission {
   #map = new MapView(byId("map"));
   #shown; // identifies the mission that is shown
-  #held = { count: null, items: [] };
+  #held = { count: null, items: [], path: [] };
   #trail = []; // of the craft since it was armed, or since the page was opened
   #decisions = []; // of a board that flies its mission, and where
   #wasArmed = null;
@@ -38,11 +38,11 @@ export class HeldMission {
     markFlown(byId("held-list"), flown);
     this.#follow(state.last_heard);
     this.#note(state.last_heard, state.mission);
-    this.#map.show({ items: this.#held.items, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail: [...this.#trail], decisions: this.#decisions });
+    this.#map.show({ items: this.#held.items, path: this.#held.path, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail: [...this.#trail], decisions: this.#decisions });
   }
 
   #showProfile() {
-    showProfile(byId("profile"), this.#held.items);
+    showProfile(byId("profile"), this.#held.path);
   }
 
   #note({ armed, lat_deg: lat, lon_deg: lon }, mission) {

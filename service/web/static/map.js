@@ -3,18 +3,17 @@
 import { draw } from "./dom.js";
 
 const METRES_PER_DEGREE = 111320;
-const WAYPOINT = 16, LOITERS = [17, 18, 19], RETURN = 20, ROIS = [80, 195, 201];
-export const isFlown = (item) => item.seq > 0 && isPlaced(item) && (item.command === WAYPOINT || LOITERS.includes(item.command));
+const LOITERS = [17, 18, 19], ROIS = [80, 195, 201];
 const MARGIN = 40, LEAST_SPAN_M = 40, FARTHEST_M = 50000;
 
-export const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
-export const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
+const isPlaced = (item) => Boolean(item.lat_e7 && item.lon_e7);
+const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
 
-// items: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
+// items, path: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
 // trail: the track that was flown, [{lat, lon}]; decisions: what the board decided on it, [{lat, lon, text}].
 // camera: zoom (1: everything fits) and dx, dy in pixels.
 // Returns { svg, view, width, height }, or null if nothing has a position. view(place): its [x, y] in the picture.
-export function drawMap({ items, flown, position, attitude, trail, decisions = [] }, width, camera) {
+export function drawMap({ items, path, flown, position, attitude, trail, decisions = [] }, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };
   const home = craftHome(position) ?? (items.length && isPlaced(items[0]) ? placeOf(items[0]) : null);
@@ -24,7 +23,7 @@ export function drawMap({ items, flown, position, attitude, trail, decisions = [
   const near = (place) => place !== null && distance(middle, place) < FARTHEST_M;
   const view = projection([...placed.map(placeOf), home, craft].filter(near), middle, width, height, camera);
   const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": inWords(items, flown, home, craft) });
-  svg.append(...tracks(items, home, view));
+  svg.append(...tracks(path, view));
   if (trail.length > 1) svg.append(draw("polyline", { class: "trail", points: line(trail, view) }));
   for (const each of decisions) svg.append(decisionMark(view(each), each.text));
   if (home) svg.append(homeMark(view(home)));
@@ -49,7 +48,7 @@ function placeAt(middle, east, north) {
   return { lat: middle.lat + north / METRES_PER_DEGREE, lon: middle.lon + east / (METRES_PER_DEGREE * shrink) };
 }
 
-export function distance(from, to) {
+function distance(from, to) {
   const { east, north } = metres(from, to);
   return Math.hypot(east, north);
 }
@@ -76,15 +75,9 @@ function projection(places, middle, width, height, camera) {
 const round = (value) => Math.round(value * 10) / 10;
 const line = (places, view) => places.map((place) => view(place).join(",")).join(" ");
 
-function tracks(items, home, view) {
-  const flown = items.filter(isFlown);
-  const places = flown.map(placeOf);
-  const lines = [];
-  if (places.length) lines.push(draw("polyline", { class: "track", points: line(home ? [home, ...places] : places, view) }));
-  if (home && places.length && items.some((item) => item.command === RETURN)) {
-    lines.push(draw("polyline", { class: "track back", points: line([places[places.length - 1], home], view) }));
-  }
-  return lines;
+function tracks(path, view) {
+  const ends = ({ start, end }) => line([start, end].map(([lat, lon]) => ({ lat: lat / 1e7, lon: lon / 1e7 })), view);
+  return path.map((leg) => draw("polyline", { class: leg.is_return ? "track back" : "track", points: ends(leg) }));
 }
 
 function itemMark(item, [x, y], isFlown) {

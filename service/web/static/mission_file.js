@@ -8,7 +8,7 @@ import { showProfile } from "./profile.js";
 import { writeForm } from "./write_form.js";
 
 const result = byId("checked"), chooser = byId("file");
-let preview = null; // { map, items } of the file that is shown
+let preview = null; // { map, items, path } of the file that is shown
 let latest = 0; // the check of an earlier file is ignored once a later one was chosen
 
 chooser.addEventListener("change", () => chooser.files.length && check(chooser.files[0]));
@@ -28,7 +28,7 @@ function over(event, isOver) {
 
 // The craft moves on the preview's map, too.
 export function followFile({ position, attitude }) {
-  if (preview !== null) preview.map.show({ items: preview.items, flown: null, position, attitude, trail: [] });
+  if (preview !== null) preview.map.show({ items: preview.items, path: preview.path, flown: null, position, attitude, trail: [] });
 }
 
 async function check(file) {
@@ -39,7 +39,7 @@ async function check(file) {
   if (turn !== latest) return;
   show(...contents);
   result.focus({ preventScroll: true });
-  if (preview !== null) showProfile(byId("file-profile"), preview.items);
+  if (preview !== null) showProfile(byId("file-profile"), preview.path);
 }
 
 // The result takes the place of the held mission, until it is closed.
@@ -61,7 +61,7 @@ async function checked(file) {
     const query = `name=${encodeURIComponent(file.name)}`;
     const list = await post(`/api/check?${query}`, body);
     const container = make("div", { id: "file-map", class: "map" });
-    preview = { map: new MapView(container), items: list.items };
+    preview = { map: new MapView(container), items: list.items, path: list.path };
     const isRejected = list.verdict === "REJECTED";
     const verdict = make("p", { class: isRejected ? "bad" : "good" }, verdictText(file.name, list));
     const write = isRejected ? [] : [writeForm("Write this mission", () => postWithToken(`/api/write?${query}`, body))];
@@ -72,9 +72,9 @@ async function checked(file) {
   }
 }
 
-function verdictText(name, { verdict, rows, flight }) {
+function verdictText(name, { verdict, rows, flight, assumed }) {
   const count = (kind) => rows.filter((row) => row.kind === kind).length;
   if (verdict === "REJECTED") return `${name} would be rejected: see the marked item.`;
   const changes = [["changed", count("changed")], ["dropped", count("dropped")]].filter(([, number]) => number).map(([kind, number]) => `${number} ${kind}`);
-  return `${name}: ${rows.length} items, ${changes.join(", ") || "no changes"}. The flight: ${flight || "none"}.`;
+  return `${name}: ${rows.length} items, ${changes.join(", ") || "no changes"}. The flight: ${flight || "none"}.${assumed && ` Assumed: ${assumed}.`}`;
 }

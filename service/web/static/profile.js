@@ -1,32 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The mission from the side: altitude above the launch point over the distance flown.
 import { draw, make } from "./dom.js";
-import { distance, isFlown, isPlaced, placeOf } from "./map.js";
 
-const WIDTH = 640, HEIGHT = 160, LEFT = 44, RIGHT = 14, TOP = 16, BOTTOM = 24, TAKEOFF = 22, RETURN = 20, LAND = 21;
+const WIDTH = 640, HEIGHT = 160, LEFT = 44, RIGHT = 14, TOP = 16, BOTTOM = 24;
 const STEPS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 
-export function showProfile(container, items) {
-  const points = flightPoints(items);
+// path: the legs flown, of /api/held or /api/check.
+export function showProfile(container, path) {
+  const points = flightPoints(path);
   container.replaceChildren(points.length > 1 ? drawProfile(points, Math.min(Math.max(container.clientWidth, 240), WIDTH)) : make("p", {}, "The mission has no flight path."));
 }
 
 // [{at_m, alt_m, seq}] along the way, from home on.
-function flightPoints(items) {
-  const home = items.length && isPlaced(items[0]) ? placeOf(items[0]) : null;
+function flightPoints(path) {
   const points = [{ at_m: 0, alt_m: 0, seq: null }];
-  let here = home;
-  const add = (to, alt_m, seq) => {
-    const before = points[points.length - 1];
-    points.push({ at_m: before.at_m + (here && to ? distance(here, to) : 0), alt_m, seq });
-    here = to ?? here;
-  };
-  for (const item of items) {
-    const alt_m = Number(item.alt_m) || 0;
-    if (isFlown(item)) add(placeOf(item), alt_m, item.seq);
-    else if (item.seq && item.command === TAKEOFF) add(null, alt_m, item.seq);
-    else if (item.seq && item.command === RETURN) add(home, alt_m || points[points.length - 1].alt_m, item.seq);
-    else if (item.seq && item.command === LAND) add(null, 0, item.seq);
+  for (const { seq, length_m, end_m } of path) {
+    const { at_m, alt_m } = points[points.length - 1];
+    points.push({ at_m: at_m + length_m, alt_m: end_m ?? alt_m, seq });
   }
   return points;
 }

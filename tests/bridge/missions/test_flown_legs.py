@@ -37,6 +37,19 @@ def test_a_flight_in_words(path: FlownPath, words: str) -> None:
     assert ", ".join(path.facts()) == words
 
 
+def test_a_drawing_has_each_leg_once_and_the_landing() -> None:
+    path = way(leg(1), leg(3, 30), leg(2), AGAIN, leg(4), RTH, lands=True).shown((1, 2, 3, 4, 5, 6))
+    assert [(each.seq, each.length_m, each.end_m, each.is_return) for each in path] == [
+        (1, 100.0, 20, False),
+        (2, 200.0, 30, False),
+        (3, 100.0, 20, False),
+        (1, 100.0, 20, False),
+        (5, 200.0, 20, False),
+        (6, 400.0, None, True),
+        (6, 0.0, 0.0, False),
+    ]
+
+
 def test_a_distance_has_the_digits_that_matter() -> None:
     assert [in_metres(metres) for metres in (0.4, 349.2, 5_020.0, 6_751_234.0)] == [
         "0 m",

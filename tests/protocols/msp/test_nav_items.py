@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import NavProfile, inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.msp.nav import FLY_HOME, LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records
@@ -31,7 +31,7 @@ RECORDS = st.builds(
 )
 
 
-@pytest.mark.parametrize("profile", [inav_profile(), multiwii_profile()], ids=lambda profile: profile.name)
+@pytest.mark.parametrize("profile", [NavProfile(), multiwii_profile()], ids=["inav", "multiwii"])
 @given(records=st.lists(RECORDS, min_size=1, max_size=4))
 def test_a_list_that_is_written_again_is_the_same_or_the_changes_are_reported(
     profile: NavProfile, records: list[NavRecord]
@@ -58,6 +58,6 @@ def test_values_that_no_item_shows_are_kept(record: NavRecord) -> None:
         record,
         NavRecord(NavAction.RTH, 1, 2, 0, p1=7, p2=9, flag=LAST),
     )
-    verdict = check_list(items_from_records(former, home_item(None)), NavRules(inav_profile(), former))
+    verdict = check_list(items_from_records(former, home_item(None)), NavRules(NavProfile(), former))
     assert verdict.records == former
     assert verdict.findings == ()

@@ -80,6 +80,7 @@ def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, 
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)
     keys = ["file", "result", "ack", "items", "sent_seqs", "records", "count", "checksum", "findings", "flight"]
+    keys += ["path", "assumed"]
     assert list(accepted) == list(rejected) == list(cleared) == keys
     assert (accepted["file"], accepted["result"], accepted["ack"]) == (str(FIELD), "ACCEPTED", "MAV_MISSION_ACCEPTED")
     assert (rejected["result"], rejected["ack"]) == ("REJECTED", "MAV_MISSION_INVALID")
@@ -105,20 +106,6 @@ def test_json_stays_json_with_infinite_values(tmp_path: Path) -> None:
     assert changes == {"p1": ("inf", 0), "p2": (None, 2)}
 
 
-def test_radius_and_capacity_are_the_flight_controllers(files: dict[str, Path]) -> None:
-    (document,) = objects(run("--json", "--wp-radius-cm", 550, files["clean"]))
-    assert [item["p2"] for item in document["items"]] == [6, 6]
-    assert run("--capacity", 145, LONG).exit_code == 1
-    assert run("--capacity", 146, LONG).exit_code == 0
-    (document,) = objects(run("--json", "--capacity", 145, LONG))
-    assert document["ack"] == "MAV_MISSION_NO_SPACE"
-
-
-@pytest.mark.parametrize("option", [["--wp-radius-cm", "-1"], ["--capacity", "x"], []])
-def test_wrong_usage_is_refused(option: list[str]) -> None:
-    assert run(*option).exit_code == 2
-
-
 def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
     output = run(FIELD).stdout
     for words in ("naze-field.waypoints", "20->15", "6->5", "5->-", "18.5->18", "DO_CHANGE_SPEED", "400->255"):
@@ -126,7 +113,7 @@ def test_a_person_sees_sent_and_stored_values_with_reasons() -> None:
     assert "WP 1: Alt changed from 20 to 15 m (take-off 2..15 m)" in output
     assert "ACCEPTED: 13 of 14 items stored, 1 dropped, values changed: " in output
     assert "does not land; 13 records, checksum " in output or "lands; 13 records, checksum " in output
-    assert "Assumed, because no board was asked: mission flight, mission_first 200 m" in output
+    assert "Assumed: the craft is at the list's home, mission flight, mission_first = 200" in output
 
 
 def test_items_keep_their_partners_where_numbers_differ(tmp_path: Path) -> None:
@@ -149,6 +136,41 @@ def test_items_keep_their_partners_where_numbers_differ(tmp_path: Path) -> None:
     rows = run("--kind", "inav", path).stdout.splitlines()
     for words in (["-->1", "DO_CHANGE_SPEED"], ["1->2", "WAYPOINT"], ["6->7", "WAYPOINT"]):
         assert any(row.split()[:2] == words for row in rows), words
+
+
+def test_values_that_no_board_gave_are_named(tmp_path: Path, files: dict[str, Path]) -> None:
+    saved = tmp_path / "diff.txt"
+    saved.write_text("set nav_wp_max_safe_distance = 300\n")
+    place = ["--home", "45.3838,8.4733"]
+    said = {
+        kind: objects(run("--json", "--kind", kind, *options, files["clean"]))[0]["assumed"]
+        for kind, options in (("harakiri", []), ("inav", [*place, "--settings", saved]), ("multiwii", place))
+    }
+    assert said == {
+        "harakiri": "the craft is at the list's home, mission flight, mission_first = 200, mission_height = 100",
+        "inav": "nav_max_altitude = 0, nav_rth_altitude = 1000",
+        "multiwii": "safe_wp_distance = 500, nav_max_altitude = 100",
+    }
+
+
+def test_with_home_given_a_list_without_it_keeps_its_first_item(tmp_path: Path) -> None:
+    """Item 0 in a relative frame, or a TAKEOFF; the jump's target moves along."""
+    place = ["--json", "--kind", "inav", "--home", "45.3838,8.4733"]
+    away = [replace(POINT, seq=seq, p2=0.0, lat_e7=453839000 + 2000 * seq) for seq in range(3)]
+    back = replace(SPEED, seq=3, command=177, p1=0.0, p2=2.0)
+    takeoff = replace(away[0], command=22)
+    file = tmp_path / "no_home.waypoints"
+    for first, kept in ((away[0], [16, 16, 16, 16, 177]), (takeoff, [16, 16, 16])):
+        items = [first, *away[1:], back] if first is away[0] else [first, *away[1:]]
+        file.write_text(write_qgc_wpl(items))
+        (held,) = objects(run(*place, file))
+        assert [item["command"] for item in held["items"]] == kept
+        assert (held["items"][0]["lat_e7"], held["items"][0]["frame"]) == (453838000, 0)
+    file.write_text(write_qgc_wpl([*away, back]))
+    assert objects(run(*place, file))[0]["items"][-1]["p1"] == 1
+    output = run(file).stdout
+    assert "Home: item 0 became home, not flown to" in output
+    assert "If the list has no home, --home LAT,LON adds it" in output
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
@@ -181,7 +203,6 @@ def test_each_kind_of_flight_controller_has_a_rules(tmp_path: Path, kind: str, s
     near = tmp_path / "near.txt"
     near.write_text("set nav_wp_max_safe_distance = 0\n")
     settings = ["--settings", near] if kind == "inav" else []
-    assert run("--kind", kind, *settings, "--capacity", "1000", LONG).exit_code == 0
     assert run("--kind", kind, *settings, LONG).exit_code == (1 if kind == "inav" else 0)
 
 
@@ -203,15 +224,14 @@ def test_an_inavs_saved_settings_decide_about_the_missions(tmp_path: Path) -> No
     assert "--settings is for --kind inav" in run("--settings", dump, mission).stderr
 
 
-def test_home_and_the_take_off_limit_may_be_given(tmp_path: Path) -> None:
+def test_home_may_be_given(tmp_path: Path) -> None:
     path = tmp_path / "nowhere.waypoints"
     climb = replace(POINT, command=22, lat_e7=0, lon_e7=0, alt_m=25.0)
     path.write_text(write_qgc_wpl([replace(HOME, lat_e7=0, lon_e7=0), climb, replace(POINT, seq=2)]))
     assert "home is assumed at the first waypoint" in run(path).output
-    placed = run("--json", "--home", "45.5,8.25", "--takeoff-max-m", "30", path)
+    placed = run("--json", "--home", "45.5,8.25", path)
     (document,) = objects(placed)
     assert (document["items"][0]["lat_e7"], document["items"][0]["lon_e7"]) == (455000000, 82500000)
-    assert document["items"][1]["alt_m"] == 25
     assert run("--home", "45.5", path).exit_code == 2
     assert run("--home", "91,0", path).exit_code == 2
 

@@ -83,7 +83,9 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         page.press("#checked .show-all")
         assert page.run("return document.querySelector('#checked tr.same').offsetHeight") > 0
         page.wait_text("#file-map svg", "H")
-        assert len(page.all("#file-profile .point")) == 12  # home, and all items but the ROI
+        # The ten legs that the board flies: to each placed item but the ROI, home, and down.
+        assert len(page.all("#file-map .track")) == 10
+        assert len(page.all("#file-profile .point")) == 11
         assert bench.board.records() == before
         page.press("#checked button.write")
         page.enter_token(bench.token)

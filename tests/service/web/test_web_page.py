@@ -71,7 +71,8 @@ def test_the_overview_has_the_vehicles_values(page: Browser) -> None:
 
 
 def test_the_map_shows_track_waypoints_roi_home_and_craft(page: Browser) -> None:
-    assert len(page.all("#map .track")) == 2  # out, and home
+    assert len(page.all("#map .track")) == 10
+    assert len(page.all("#map .back")) == 1
     # Each in a single script, because the map is redrawn and elements found earlier disappear.
     numbers = page.run("return [...document.querySelectorAll('#map .number')].map((mark) => mark.textContent)")
     assert numbers == ["2", "3", "4", "5", "6", "7", "8", "9", "10"]

@@ -11,8 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.controllers.harakiri.check import HarakiriRules
-from bridge.controllers.harakiri.flight import LEAST_M, MAX_LEG_M, TAKEOFF_MOST_M, USUAL_FLIGHT, FlightLimits
+from bridge.controllers.harakiri.check import (
+    LEAST_M,
+    MAX_LEG_M,
+    TAKEOFF_MOST_M,
+    USUAL_FLIGHT,
+    FlightLimits,
+    HarakiriRules,
+)
 from bridge.missions.list_check import check_list
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem

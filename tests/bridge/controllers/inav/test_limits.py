@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 
-from bridge.controllers.inav.limits import InavLimits, RthAltMode, SafehomeUsageMode, saved_limits
-from bridge.controllers.inav.platforms import Platform
+from bridge.controllers.inav.limits import InavLimits, Platform, RthAltMode, SafehomeUsageMode, saved_limits
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.inav_places import FW_APPROACH, MISSION_APPROACH, SET_FW_APPROACH, FwApproach, Safehome
@@ -31,7 +30,7 @@ NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * N
 
 
 def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: Any) -> list[str]:
-    rules = NavRules(inav_profile(limits=InavLimits(**limits)))
+    rules = NavRules(NavProfile(limits=InavLimits(**limits)))
     findings = without_defaults(check_list((HOME, *items), rules, here).findings)
     assert all(len(finding.text()) <= 50 for finding in findings if finding.news is News.DANGER)
     return [finding.text() for finding in findings]
@@ -272,13 +271,16 @@ set vbat_warning_cell_voltage = 300
 def test_settings_are_read_from_a_dump_and_from_a_param_file() -> None:
     limits = saved_limits(read_settings_file(DUMP.encode(), "dump.txt"))
     assert limits == InavLimits(
+        unknown=("nav_max_altitude",),
         nav_wp_max_safe_distance=1500,
         nav_rth_alt_mode=RthAltMode.FIXED,
         nav_rth_altitude=2000,
         safehomes=(Safehome(0, True, LAT + NORTH, LON), Safehome(1, False, 0, 0)),
     )
     params = read_settings_file(b"# board: INAV 9.1.0\nnav_max_altitude,12000\nnav_rth_alt_mode,2\n", "a.param")
-    assert saved_limits(params) == InavLimits(nav_max_altitude=12000, nav_rth_alt_mode=RthAltMode.FIXED)
+    unknown = "nav_wp_max_safe_distance", "nav_rth_altitude"
+    expected = InavLimits(nav_max_altitude=12000, nav_rth_alt_mode=RthAltMode.FIXED, unknown=unknown)
+    assert saved_limits(params) == expected
 
 
 def test_a_value_that_no_inav_has_is_refused() -> None:

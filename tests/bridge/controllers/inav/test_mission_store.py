@@ -13,7 +13,7 @@ from bridge.controllers.inav import profile as inav
 from bridge.controllers.inav.limits import InavLimits
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.frame import MspParser
@@ -81,7 +81,7 @@ def test_a_mission_reads_back_as_sent_on_each_version(version: str) -> None:
     sent = mixed()
     assert Upload(station, sent).run() is ACCEPTED
     assert world.store.missions[-1][0].verdict.findings == ()
-    records = list(check_list(sent, NavRules(inav_profile())).records)
+    records = list(check_list(sent, NavRules(NavProfile())).records)
     assert [record[1:] for record in board.stored_records[: len(records)]] == [r.pack() for r in records]
     read = Download(station).run()
     assert without_home(read) == without_home(sent)
@@ -221,7 +221,7 @@ wild = st.builds(
 @settings(max_examples=25)
 def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionItem]) -> None:
     sent = [plan(1)[0], *items]
-    if not check_list(sent, NavRules(inav_profile(limits=InavLimits()))).records:
+    if not check_list(sent, NavRules(NavProfile(limits=InavLimits()))).records:
         return
     board, world, station = board_with()
     assert Upload(station, sent).run() is ACCEPTED

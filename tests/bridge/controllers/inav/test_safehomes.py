@@ -11,7 +11,7 @@ from bridge.line.conversation import Conversation
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.inav_places import FW_APPROACH, SAFEHOME, Safehome
+from protocols.msp.inav_places import FW_APPROACH, SAFEHOME
 from tests.bridge.controllers.inav.test_place_store import RALLY_ITEMS, place
 
 
@@ -28,11 +28,6 @@ def test_points_with_a_height_or_without_a_place_are_named() -> None:
 def test_more_than_eight_points_and_other_items_are_rejected() -> None:
     assert check_list([place(Command.RALLY_POINT, n) for n in range(9)], RallyRules()).ack is MissionResult.NO_SPACE
     assert check_list([place(16)], RallyRules()).ack is MissionResult.UNSUPPORTED
-
-
-def test_safehomes_that_are_off_are_named_when_they_are_erased() -> None:
-    verdict = check_list(RALLY_ITEMS, RallyRules((Safehome(0, False, 453838000, 84733000),)))
-    assert [finding.text() for finding in verdict.findings] == ["Safehomes that were off are erased: 1"]
 
 
 @pytest.mark.parametrize(

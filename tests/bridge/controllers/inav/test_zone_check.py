@@ -9,7 +9,7 @@ import pytest
 from bridge.controllers.inav.limits import InavLimits
 from bridge.controllers.inav.zone_check import zone_ahead
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.inav_places import Corner, FenceAction, Geozone
@@ -27,7 +27,7 @@ EAST = 12788
 
 def texts(*zones: Geozone, legs: tuple[MissionItem, ...], here: tuple[int, int] | None = None) -> list[str]:
     limits = InavLimits(nav_wp_max_safe_distance=0, zones=zones)
-    verdict = check_list((HOME, *legs), NavRules(inav_profile(limits=limits)), here)
+    verdict = check_list((HOME, *legs), NavRules(NavProfile(limits=limits)), here)
     return [finding.text() for finding in verdict.findings]
 
 

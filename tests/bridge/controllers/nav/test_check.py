@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mavlink.codec import item_from_float_message
 from protocols.mission_item import MissionItem, MissionResult
@@ -298,6 +298,6 @@ foreign_turns = st.one_of(
 def test_another_planners_list_is_written_back_unchanged(before: list[NavRecord], last: NavRecord) -> None:
     """User actions, legs that fly home and a landing's ground elevation appear in no item but are kept."""
     held = (*before, replace(last, flag=0xA5))
-    again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(inav_profile(), held))
+    again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(NavProfile(), held))
     changes = [finding for finding in again.findings if finding.was != finding.becomes]
     assert (again.result, changes, again.records) == (Result.ACCEPTED, [], held)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from bridge.model.missions import Outcome
 from protocols.mission_item import MissionItem, MissionResult
@@ -20,7 +20,7 @@ from tests.support.conversations import Download, Upload, clear_message, count_m
 from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
 from tests.support.world import GroundStation, Radio, World
 
-RULES = NavRules(inav_profile())
+RULES = NavRules(NavProfile())
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bridge.controllers.nav.check import NavRules
-from bridge.controllers.nav.rules import inav_profile
+from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import FLY_HOME, LAST, NavRecord
@@ -41,7 +41,7 @@ def test_losses_of_a_changed_leg_are_reported(record: NavRecord, lost: str) -> N
     held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
     items = list(items_from_records(held, home_item((LAT, LON))))
     items[2] = replace(items[2], alt_m=40.0)
-    verdict = check_list(items, NavRules(inav_profile(), held))
+    verdict = check_list(items, NavRules(NavProfile(), held))
     expected = [(News.WARNING, f"Lost with the old list, as no MAVLink item can show it: {lost}")] if lost else []
     assert [(finding.news, finding.text()) for finding in verdict.findings] == expected
     assert verdict.records[1].alt_cm == 4000
@@ -61,7 +61,7 @@ HELD = (
 def written_again(change: Callable[[list[MissionItem]], list[MissionItem]]) -> tuple[tuple[NavRecord, ...], list[str]]:
     """The records and the messages after HELD was read, changed, and written again."""
     items = change(list(items_from_records(HELD, home_item((LAT, LON)))))
-    verdict = check_list(items, NavRules(inav_profile(), HELD))
+    verdict = check_list(items, NavRules(NavProfile(), HELD))
     return verdict.records, [finding.text() for finding in verdict.findings if finding.news is News.WARNING]
 
 
