@@ -101,6 +101,9 @@ class OwnVehicle:
     def stores_fences(self) -> bool:
         return bool(self._capabilities() & messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE)
 
+    def hear_station_time(self, unix_s: float, now: float) -> None:
+        self._session.vehicle.hear_station_time(now, unix_s)
+
     def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""
         station.greeted_until, station.is_informed = now + _NEWCOMER_S, False

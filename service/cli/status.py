@@ -9,6 +9,7 @@ from payloads.mission_data import Json
 from service.cli.daemon_client import BridgeClient, bridge_options
 from service.daemon.client import STATUS
 from service.machine.host import Host
+from service.machine.raspberry_pi import is_mini_uart
 from service.settings.addresses import client_hosts, parse_gcs
 from service.settings.web import ListenAddress, parse_listen
 from terminal.sentences import say
@@ -21,8 +22,8 @@ _OLD_S = 5.0
 @bridge_options
 def status(client: BridgeClient) -> None:
     """Show the state of the bridge and the vehicle: connections, mode, GPS fix, battery, mission."""
-    facts = client.ask(STATUS)
-    client.show(facts, lambda: _print_lines(list(status_lines(facts, Host().ipv4_addresses()))))
+    facts, host = client.ask(STATUS), Host()
+    client.show(facts, lambda: _print_lines(list(status_lines(facts, host.ipv4_addresses(), host))))
 
 
 def _print_lines(lines: Sequence[tuple[str, str]]) -> None:
@@ -31,10 +32,10 @@ def _print_lines(lines: Sequence[tuple[str, str]]) -> None:
         say(text, prefix=f"{name:{width}}  ", indent=width + 2)
 
 
-def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]:
+def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tuple[str, str]]:
     """Yield a name and a text for each line; `addresses` are this machine's own."""
     yield "Bridge", f"naze-bridge {facts['version']}, running for {duration(facts['uptime_s'])}"
-    yield "Flight controller", _flight_controller(facts)
+    yield "Flight controller", _flight_controller(facts, host)
     if facts["flight_controller"] is not None:
         armed = {True: "ARMED", False: "disarmed", None: "arming state unknown"}[facts["armed"]]
         yield "Vehicle", ", ".join(filter(None, (armed, facts["mode"]))) + _age(facts["status_age_s"])
@@ -57,6 +58,8 @@ def status_lines(facts: Json, addresses: list[str]) -> Iterator[tuple[str, str]]
             yield "Page", f"http://{ListenAddress(client_hosts(page.host, addresses)[0], page.port)}/"
     if facts["store_trouble"]:
         yield "Missions", f"kept in memory only: {facts['store_trouble']}"
+    if facts["clock_trouble"]:
+        yield "Clock", facts["clock_trouble"]
     for text in facts["recording"]:
         yield "Recording", text
     for text in facts.get("ports_passed_over", ()):
@@ -82,9 +85,10 @@ def _age(seconds: float | None) -> str:
     return "" if seconds is None or seconds < _OLD_S else f", {duration(seconds)} ago"
 
 
-def _flight_controller(facts: Json) -> str:
+def _flight_controller(facts: Json, host: Host) -> str:
     if facts["flight_controller"] is None:
-        return facts["trouble"] or f"none yet: searching on {facts['where']}"
+        doubt = ", the mini-UART; see sudo naze-bridge doctor" if is_mini_uart(host, facts["where"]) else ""
+        return facts["trouble"] or f"none yet: searching on {facts['where']}{doubt}"
     speed = "" if facts["speed_baud"] is None else f" at {facts['speed_baud']} baud"
     since = "" if facts["found_s"] is None else f", for {duration(facts['found_s'])}"
     firmware = "" if facts["firmware_version"] is None else f", firmware {facts['firmware_version']},"

@@ -133,6 +133,7 @@ class DaemonApi:
             ],
             "recording": daemon.recording,
             "store_trouble": daemon.store_trouble,
+            "clock_trouble": daemon.clock_trouble,
             "mission_records": None if mission is None else mission.count,
             "mission_checksum": None if mission is None else mission.checksum,
             "mission_state": None if mission is None else mission.state,

@@ -39,7 +39,7 @@ from service.machine.host import Host
 from service.machine.log_setup import warn_once
 from service.machine.own_networks import OwnNetworks
 from service.machine.package import version
-from service.machine.raspberry_pi import is_clock_set
+from service.machine.raspberry_pi import SYNCHRONIZED, clock_trouble, is_clock_set
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
@@ -88,7 +88,7 @@ class Daemon:
         self._tlog: TlogRecorder | None = None
         if settings.tlog is not None and settings.state_dir is not None:
             self._tlog = TlogRecorder(settings.state_dir / TLOG_FOLDER, settings.tlog)
-        host = host or Host()
+        host = self._host = host or Host()
         self._flight = FlightFile(settings.state_dir, str(settings.fc), host)
         self._last_settings = LastSettings(settings.state_dir, lambda: self.fc.where)
         self._signing = SigningState(
@@ -163,6 +163,12 @@ class Daemon:
 
     def report(self) -> VehicleReport:
         return self.bridge.report(self._loop.time())
+
+    @property
+    def clock_trouble(self) -> str:
+        """How far this machine's clock is off; empty if it is right, set by a network, or not known to be wrong."""
+        found = self.bridge.vehicle.wrong_clock_s(time.time() - self._loop.time())
+        return "" if found is None or self._host.path(SYNCHRONIZED).exists() else clock_trouble(*found)
 
     def followers_status(self) -> Json:
         return {key: value for follower in self._followers for key, value in follower.status().items()}

@@ -3,6 +3,7 @@
 
 import re
 from dataclasses import dataclass
+from datetime import timedelta
 
 from service.machine.host import Host
 
@@ -10,6 +11,8 @@ from service.machine.host import Host
 BOOT_FOLDERS = ("/boot/firmware", "/boot")
 #: Made by systemd-timesyncd when it has set the clock. adjtimex(2) is forbidden to the hardened service.
 SYNCHRONIZED = "/run/systemd/timesync/synchronized"
+#: A signature may be as late.
+_CLOCK_TOLERANCE_S = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +38,30 @@ def pi_model(host: Host) -> PiModel | None:
     return PiModel(name, "/dev/serial0", "enable_uart=1")
 
 
+def is_mini_uart(host: Host, device: str) -> bool:
+    """True for the UART that models before the Pi 5 have on the header while Bluetooth has the better one.
+
+    It has no FIFO to speak of, and its speed follows the core's clock.
+    """
+    model = pi_model(host)
+    return model is not None and model.header_uart == "/dev/serial0" and str(host.resolve(device)) == "/dev/ttyS0"
+
+
 def is_clock_set(host: Host) -> bool:
     """False on a Pi until a network has set the clock: without a battery it continues from the last shutdown."""
     return host.path(SYNCHRONIZED).exists() or pi_model(host) is None
+
+
+def clock_trouble(off_s: float, whose: str) -> str:
+    """A sentence with its remedy, after a colon, about a clock that is wrong by so many seconds; empty for a right one.
+
+    The remedy is relative, because a time of day would be over before it is typed.
+    """
+    if abs(off_s) < _CLOCK_TOLERANCE_S:
+        return ""
+    far = timedelta(seconds=round(abs(off_s)))
+    side = "behind" if off_s > 0 else "ahead of"
+    return f"the Pi's clock is {far} {side} {whose}: sudo date --set '{off_s:+.0f} seconds'"
 
 
 def boot_file(host: Host, name: str) -> str | None:

@@ -105,6 +105,7 @@ class Api:
                 "newest_mission": newest,
                 "newest_backup": newest_backup,
                 "store_trouble": store,
+                "clock_trouble": daemon.clock_trouble,
                 "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
                 "write": self._writer.state,

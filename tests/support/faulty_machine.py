@@ -40,6 +40,14 @@ class FaultyMachine(Host):
         """Only root could make character devices."""
         return str(device).startswith("/dev/tty") and self.path(device).is_file()
 
+    def is_a(self, model: str, header: str) -> None:
+        """Make it a Raspberry Pi with this UART on its header."""
+        self.write("/proc/device-tree/model", f"{model}\0")
+        self.write("/boot/firmware/config.txt", "[cm4]\notg_mode=1\n")
+        self.write(f"/dev/{header}")
+        self.path("/dev/serial0").unlink()
+        self.path("/dev/serial0").symlink_to(header)
+
     def owned_by(self, path: str, group: str) -> None:
         """Give a file to a group. Only root and the group's members can: for other users it keeps theirs."""
         with suppress(PermissionError):

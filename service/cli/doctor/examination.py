@@ -25,12 +25,13 @@ from service.cli.doctor.port import (
 )
 from service.daemon.client import ControlError
 from service.machine.host import Host
+from service.machine.raspberry_pi import boot_file, is_mini_uart
 from service.settings import Settings
-from service.settings.addresses import AddressError, AutoFc, FcAddress, parse_fc
+from service.settings.addresses import AddressError, AutoFc, FcAddress, SerialFc, parse_fc
 
 #: The facts of a daemon's status that the checks use.
 _STATUS: Mapping[str, type] = {
-    **dict.fromkeys(("flight_controller", "state", "where", "store_trouble"), str),
+    **dict.fromkeys(("flight_controller", "state", "where", "store_trouble", "clock_trouble"), str),
     **dict.fromkeys(("speed_baud", "found_s", "bad_checksums", "fc_bytes_received"), float),
     "armed": bool,
     **dict.fromkeys(("refused", "links"), list),
@@ -65,13 +66,15 @@ def examine(
     yield from results
     is_free = not any(found.grade is Grade.PROBLEM for found in results)
     is_free = is_free and all(holder_of_port(host, port) is None for port in ports)
-    yield from check_flight_controller(fc, running, ask_port if is_free else None, source)
+    is_mini = any(isinstance(port, SerialFc) and is_mini_uart(host, port.path) for port in ports)
+    config = (boot_file(host, "config.txt") or "") if is_mini else ""
+    yield from check_flight_controller(fc, running, ask_port if is_free else None, source, config)
     links = [str(link) for link in settings.gcs]
     yield from check_wifi(host, settings.gcs)
     yield from check_ports(host, settings, is_running=running is not None and running["links"] in (None, links))
     yield from check_keys(settings.gcs, settings.access)
     yield check_zenoh(settings.zenoh)
-    yield check_clock(host, datetime.fromtimestamp(time.time(), UTC))
+    yield check_clock(host, datetime.fromtimestamp(time.time(), UTC), (running or {}).get("clock_trouble") or "")
     state_dir = settings.state_dir or Path()
     yield from filter(None, [check_root(host)])
     yield check_disk(state_dir)

@@ -3,6 +3,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
@@ -10,7 +11,7 @@ from bridge.fc.states.mute import Cli
 from bridge.vehicle.incoming import OWN_IDS
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check
-from service.cli.doctor.checked import Checked, note, ok, problem
+from service.cli.doctor.checked import Checked, Grade, note, ok, problem
 from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.cli.doctor.port import fc_fix, fc_remedy
 from service.daemon.client import ControlError
@@ -27,12 +28,34 @@ _REFUSED = re.compile(r"(\d+) x (.*) \((.*)\)")
 
 
 def check_flight_controller(
-    fc: FcAddress, running: Json | None, ask_port: Callable[[], Json] | None, source: str = ""
+    fc: FcAddress,
+    running: Json | None,
+    ask_port: Callable[[], Json] | None,
+    source: str = "",
+    mini_uart_config: str = "",
 ) -> list[Checked]:
     """Find the flight controller, and the troubles that its line and its stations have.
 
     `running`: a daemon's status; `ask_port` returns one or raises ControlError. `source`: where `fc` is set.
+    `mini_uart_config`: the path of config.txt if the port is the mini-UART.
     """
+    found = _check(fc, running, ask_port, source)
+    if not mini_uart_config:
+        return found
+    better = f"printf '\\n[all]\\ndtoverlay=disable-bt\\n' | sudo tee -a {mini_uart_config} && sudo reboot"
+    return [
+        replace(
+            each,
+            found=f"{each.found}; the port is the mini-UART",
+            remedy=f"{each.remedy} If all that is right, give the header Bluetooth's UART: {better}",
+        )
+        if each.check == "flight controller" and each.grade is Grade.PROBLEM
+        else each
+        for each in found
+    ]
+
+
+def _check(fc: FcAddress, running: Json | None, ask_port: Callable[[], Json] | None, source: str = "") -> list[Checked]:
     if running is not None:
         return [ok("daemon", "running"), _who(fc, running, source), *check_running(running)]
     if ask_port is None:

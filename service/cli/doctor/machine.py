@@ -24,6 +24,7 @@ from storage.store_error import StoreError
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at the last shutdown; no release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+_SET_CLOCK = "sudo date --set 'YEAR-MONTH-DAY HOUR:MINUTE', with the present time"
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pyserial", "eclipse-zenoh")
 #: Bits of the reply: undervoltage now, and since the start.
@@ -43,21 +44,20 @@ def check_versions(host: Host) -> Checked:
     )
 
 
-def check_clock(host: Host, now: datetime) -> Checked:
-    """Check the clock, which logs and signatures depend on."""
+def check_clock(host: Host, now: datetime, trouble: str = "") -> Checked:
+    """Check the clock, which logs and signatures depend on. `trouble`: what a running daemon knows."""
     time_text = f"{now:%Y-%m-%d %H:%M} UTC"
+    if trouble:
+        found, _, remedy = trouble.partition(": ")
+        return problem("clock", found, remedy)
     if now < EPOCH:
-        return problem(
-            "clock", f"it is {time_text}, years in the past", f"set it: sudo date --set '{EPOCH:%Y-%m-%d} 12:00'"
-        )
+        return problem("clock", f"it is {time_text}, years in the past", _SET_CLOCK)
     if host.path(SYNCHRONIZED).exists():
         return ok("clock", f"{time_text}, set by the network")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
         return ok("clock", f"{time_text}, kept by {keeper}")
-    remedy = (
-        "without a network nothing sets it: connect to the Internet once, or sudo date --set '...' before the flight"
-    )
+    remedy = f"connect to the Internet once, or before the flight: {_SET_CLOCK}"
     return note("clock", f"{time_text}, not set by the network since the start", remedy)
 
 

@@ -58,7 +58,7 @@ async function look() {
     await held.show(state);
     await showStored(state);
     await showConnect();
-    showTrouble(state.store_trouble);
+    showTrouble(state.store_trouble || state.clock_trouble);
   } catch (error) {
     if (last === null || isStale()) showSilence(error.message);
     else showTrouble(error.message);
