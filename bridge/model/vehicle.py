@@ -244,7 +244,7 @@ class Vehicle:
     def __init__(self) -> None:
         self._readings: dict[type[Reading], Reading] = {}
         #: By a ground station's clock: when the monotonic clock was 0, seconds since 1970.
-        self._station_epoch_s: float | None = None
+        self.station_epoch_s: float | None = None
         #: The latest reading of a kind, however old: `last(Height)`.
         self.last: _Last = self._readings.get  # type: ignore[assignment]
         self.forget()
@@ -370,19 +370,9 @@ class Vehicle:
         if unix_s > _EARLIEST_UNIX_S:
             self.hear(GpsTime(now, source, unix_s))
 
-    def hear_station_time(self, now: float, unix_s: float) -> None:
-        """Take a ground station's clock, seconds since 1970."""
+    def hear_station_time(self, unix_s: float, now: float) -> None:
         if unix_s > _EARLIEST_UNIX_S:
-            self._station_epoch_s = unix_s - now
-
-    def wrong_clock_s(self, epoch_s: float) -> tuple[float, str] | None:
-        """The seconds that a clock is behind, and whose time that is, the board's or a ground station's; None: unknown.
-
-        epoch_s: by that clock, when the monotonic clock was 0, seconds since 1970.
-        """
-        if (gps := self.last(GpsTime)) is not None:
-            return gps.unix_s - gps.heard_at - epoch_s, "the flight controller"
-        return None if self._station_epoch_s is None else (self._station_epoch_s - epoch_s, "a ground station")
+            self.station_epoch_s = unix_s - now
 
     def fresh(self, kind: type[ReadingT], now: float, stale_s: float | None = None) -> ReadingT | None:
         reading = self.last(kind)

@@ -92,6 +92,7 @@ class OwnVehicle:
         #: The ground stations whose waypoint was set since the last report of the board.
         self._asked_current: list[Sender] = []
         self._nav_words = NavWords()
+        self.hear_station_time = session.vehicle.hear_station_time
         #: What a Harakiri's flight has decided, as it was last sent.
         self._summary = 0
         #: The last reason for the stop of a mission flight.
@@ -100,9 +101,6 @@ class OwnVehicle:
     @property
     def stores_fences(self) -> bool:
         return bool(self._capabilities() & messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE)
-
-    def hear_station_time(self, unix_s: float, now: float) -> None:
-        self._session.vehicle.hear_station_time(now, unix_s)
 
     def newcomer(self, station: GroundStation, now: float) -> None:
         """Send a new ground station more heartbeats, so that it connects sooner, then home and why it cannot arm."""

@@ -24,6 +24,7 @@ from bridge.missions.mission_service import DeliveryResult, MissionEnded
 from bridge.model.events import Armed, BridgeEvent, Disarmed, FcFound, FcInCommandLine, FcLost, PortLost
 from bridge.model.missions import ArrivedMission
 from bridge.model.settings import TakenBackup
+from bridge.model.vehicle import GpsTime
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection
@@ -167,8 +168,12 @@ class Daemon:
     @property
     def clock_trouble(self) -> str:
         """How far this machine's clock is off; empty if it is right, set by a network, or not known to be wrong."""
-        found = self.bridge.vehicle.wrong_clock_s(time.time() - self._loop.time())
-        return "" if found is None or self._host.path(SYNCHRONIZED).exists() else clock_trouble(*found)
+        vehicle, own_epoch_s = self.bridge.vehicle, time.time() - self._loop.time()
+        gps = vehicle.last(GpsTime)
+        epoch_s = vehicle.station_epoch_s if gps is None else gps.unix_s - gps.heard_at
+        if epoch_s is None or self._host.path(SYNCHRONIZED).exists():
+            return ""
+        return clock_trouble(epoch_s - own_epoch_s, "a ground station" if gps is None else "the flight controller")
 
     def followers_status(self) -> Json:
         return {key: value for follower in self._followers for key, value in follower.status().items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder of telemetry logs: one file at a time, bounded in size, total and age.
+"""The folder of telemetry logs: one file at a time, bounded in size and total.
 
 Reads no clock: the time is passed in, or taken from the records themselves.
 """
@@ -15,13 +15,14 @@ from pathlib import Path
 import structlog
 
 from protocols.tlog import first_stamp_us
-from service.settings import TlogLimits
 from storage.os_error import reason
 
 #: Mission Planner's format, but in UTC; the names of flights (the craft was armed) end in " flight".
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
 _NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d( flight)?\.tlog")
 _FLIGHT = " flight"
+#: One file may have this part of the total, plus up to a second's records.
+_FILES = 16
 #: The pause after a failure: a full or read-only disk rarely recovers at once.
 _RETRY_S = 60.0
 #: The maximum loss in a power cut; syncing more often wears out an SD card.
@@ -44,16 +45,14 @@ def free_space(folder: Path) -> int:
 
 
 class TlogFolder:
-    """Appends to a file that is opened at the first write.
+    """Appends to a file that is opened at the first write. `most`: the bytes of all files together.
 
     Disk errors must not affect a flight, so nothing raises. A failure is logged once, and retried later.
     """
 
-    def __init__(
-        self, folder: Path, limits: TlogLimits, measure_free_space: Callable[[Path], int] = free_space
-    ) -> None:
+    def __init__(self, folder: Path, most: int, measure_free_space: Callable[[Path], int] = free_space) -> None:
         self._folder = folder
-        self._limits = limits
+        self._most, self._most_of_one = most, most // _FILES
         self._measure_free_space = measure_free_space
         #: Without a buffer: written bytes survive a crash of this process.
         self._file: FileIO | None = None
@@ -64,7 +63,7 @@ class TlogFolder:
 
     @property
     def is_full(self) -> bool:
-        return self._file is not None and self._file.tell() >= self._limits.file_size
+        return self._file is not None and self._file.tell() >= self._most_of_one
 
     def describe(self) -> str:
         """The open file, or the reason why none is open. May be called while another thread writes."""
@@ -111,22 +110,17 @@ class TlogFolder:
     def _new_path(self, began: datetime) -> Path:
         """Name a file after `began`, or the first free second after it: clocks may be set back."""
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._make_room(began)
+        self._make_room()
         while (path := self._folder / began.strftime(_NAME_FORMAT)).exists() or _of_flight(path).exists():
             began += timedelta(seconds=1)
         return path
 
-    def _make_room(self, now: datetime) -> None:
-        """Remove the oldest files until another fits, flights last, which have no age limit.
-
-        Files with other names are left alone.
-        """
-        too_old = (now - timedelta(days=self._limits.days)).strftime(_NAME_FORMAT)
+    def _make_room(self) -> None:
+        """Remove the oldest files until another fits, flights last. Files with other names are left alone."""
         sizes = {path: path.stat().st_size for path in self._folder.iterdir() if is_log_name(path.name)}
         total = sum(sizes.values())
         for path in sorted(sizes, key=lambda path: (_is_flight(path), path.name)):
-            is_outdated = path.name < too_old and not _is_flight(path)
-            if not is_outdated and total + self._limits.file_size <= self._limits.total_size:
+            if total + self._most_of_one <= self._most:
                 return
             path.unlink()
             total -= sizes[path]

@@ -12,7 +12,6 @@ import structlog
 from protocols.mavlink.dialect import messages
 from protocols.tlog import heartbeat_type, tlog_records
 from service.recording.tlog_folder import TlogFolder
-from service.settings import TlogLimits
 
 #: Within the state directory.
 TLOG_FOLDER = "logs"
@@ -38,11 +37,11 @@ class TlogRecorder:
     A file begins without ground stations' heartbeats: Mission Planner shows the system whose HEARTBEAT comes first in a
     log, and recognises only the systems 255 and 253 as ground stations. They are left out until a vehicle's HEARTBEAT.
 
-    `read_clock`: the system's time, nanoseconds since the Unix epoch.
+    `most`: the bytes of all files together. `read_clock`: the system's time, nanoseconds since the Unix epoch.
     """
 
-    def __init__(self, folder: Path, limits: TlogLimits, read_clock: Callable[[], int] = time.time_ns) -> None:
-        self._folder = TlogFolder(folder, limits)
+    def __init__(self, folder: Path, most: int, read_clock: Callable[[], int] = time.time_ns) -> None:
+        self._folder = TlogFolder(folder, most)
         self._read_clock = read_clock
         self._epoch_us = self._present_epoch_us()
         self._is_flying = False

@@ -3,13 +3,12 @@
 
 from service.settings.key import SettingsError
 from service.settings.load import default_state_dir, load_settings, takeoff_limit_m
-from service.settings.settings import DEFAULT_GCS, Settings, TlogLimits
+from service.settings.settings import DEFAULT_GCS, Settings
 
 __all__ = [
     "DEFAULT_GCS",
     "Settings",
     "SettingsError",
-    "TlogLimits",
     "default_state_dir",
     "load_settings",
     "takeoff_limit_m",

@@ -47,18 +47,6 @@ class LogLevel(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class TlogLimits:
-    """Bytes per telemetry log (plus up to a second's records) and for all together; days that one is kept."""
-
-    file_size: int = 16 << 20
-    total_size: int = 256 << 20
-    days: int = 30
-
-
-_TLOG = TlogLimits()
-
-
-@dataclass(frozen=True, slots=True)
 class Settings(BridgeSettings):
     """The settings of a daemon. Without `state_dir` it does not store anything.
 
@@ -105,17 +93,11 @@ class Settings(BridgeSettings):
         Example('[{address = "tcpin:127.0.0.1:5761", write = false}]'),
     ] = ()
     record_tlog: Annotated[bool, "Record telemetry, for replay in Mission Planner."] = True
-    tlog_file_mb: Annotated[int, range(1, 1025), "Size of one telemetry log, megabytes, 1..1024."] = (
-        _TLOG.file_size >> 20
-    )
     tlog_total_mb: Annotated[
         int,
         range(2, (1 << 20) + 1),
-        "Size of all telemetry logs together, megabytes, at least twice tlog_file_mb; the oldest are deleted.",
-    ] = _TLOG.total_size >> 20
-    tlog_days: Annotated[int, range(1, 3651), "How long a telemetry log without a flight is kept, days, 1..3650."] = (
-        _TLOG.days
-    )
+        "Size of all telemetry logs together, megabytes; the oldest are deleted, flights last.",
+    ] = 256
     log_level: Annotated[LogLevel, "Minimum level of logged events: debug, info, warning or error.", LIVE] = (
         LogLevel.INFO
     )
@@ -128,9 +110,6 @@ class Settings(BridgeSettings):
     web: Annotated[WebSettings | None, "The status page, off without this table."] = None
 
     @property
-    def tlog(self) -> TlogLimits | None:
-        """None: telemetry is not recorded. There is always room for two logs."""
-        if not self.record_tlog:
-            return None
-        total_mb = max(self.tlog_total_mb, 2 * self.tlog_file_mb)
-        return TlogLimits(self.tlog_file_mb << 20, total_mb << 20, self.tlog_days)
+    def tlog(self) -> int | None:
+        """The size of all telemetry logs, bytes; None if telemetry is not recorded."""
+        return self.tlog_total_mb << 20 if self.record_tlog else None

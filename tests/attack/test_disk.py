@@ -28,7 +28,7 @@ def logs(state_dir: Path) -> list[Path]:
 
 def test_the_log_of_a_flight_survives_a_flood(start: Starter, stack: ExitStack) -> None:
     config = start.directory / "naze-bridge.toml"
-    config.write_text("tlog_file_mb = 1\ntlog_total_mb = 3\n")
+    config.write_text("tlog_total_mb = 3\n")
     bench = start.bench(daemon_options=("--config", str(config)))
     state = bench.daemon.state_dir
     pilot = Stranger(bench.daemon.address, sysid=255)

@@ -28,9 +28,7 @@ _LABELS = {
     "sysid": ("MAVLink system id", ""),
     "takeoff_max_m": ("Highest take-off", "m"),
     "record_tlog": ("Record telemetry", ""),
-    "tlog_file_mb": ("Size of a telemetry log", "MB"),
-    "tlog_total_mb": ("Size of all of them", "MB"),
-    "tlog_days": ("Keep those without a flight", "days"),
+    "tlog_total_mb": ("Size of all telemetry logs", "MB"),
     "log_level": ("Log from severity", ""),
 }
 _KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _LABELS}

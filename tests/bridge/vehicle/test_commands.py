@@ -7,7 +7,6 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.model.vehicle import Source
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.dialect import Message
 from tests.support.world import GroundStation, World, ready_world
@@ -279,15 +278,12 @@ def test_timesync_is_answered(flying: tuple[World, GroundStation]) -> None:
     assert answers(flying, m.MAVLink_timesync_message(5, 777)) == []
 
 
-def test_a_clock_is_compared_with_a_station_until_the_board_has_the_time(flying: tuple[World, GroundStation]) -> None:
+def test_a_stations_clock_is_remembered(flying: tuple[World, GroundStation]) -> None:
     world, _ = flying
-    vehicle, epoch_s = world.bridge.vehicle, 1_790_000_000.0
     answers(flying, m.MAVLink_system_time_message(0, 5000))  # a station without a clock
-    assert vehicle.wrong_clock_s(epoch_s) is None
-    answers(flying, m.MAVLink_system_time_message(int((epoch_s + 86_400 + world.now) * 1e6), 0))
-    assert vehicle.wrong_clock_s(epoch_s) == (pytest.approx(86_400, abs=2), "a ground station")
-    vehicle.hear_gps_time(world.now, Source.MSP, epoch_s + world.now - 7200)
-    assert vehicle.wrong_clock_s(epoch_s) == (pytest.approx(-7200), "the flight controller")
+    assert world.bridge.vehicle.station_epoch_s is None
+    answers(flying, m.MAVLink_system_time_message(int((1_790_000_000 + world.now) * 1e6), 0))
+    assert world.bridge.vehicle.station_epoch_s == pytest.approx(1_790_000_000, abs=2)
 
 
 # Parameters.

@@ -2,8 +2,10 @@
 
 import asyncio
 import os
+import re
 import signal
 import subprocess
+import time
 import tty
 from contextlib import suppress
 from pathlib import Path
@@ -11,9 +13,11 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
+from bridge.model.vehicle import Source
 from service.daemon import fc_connection
 from service.daemon.client import ControlError, ask_daemon
 from service.daemon.daemon import Daemon
+from service.machine.host import Host
 from service.settings import Settings
 from service.settings.addresses import SerialFc, SimulatedFc
 from tests.support.benches import Starter
@@ -87,6 +91,24 @@ async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytes
             await running
     os.close(near)
     os.close(far)
+
+
+async def test_a_wrong_clock_is_told_until_a_network_sets_it(tmp_path: Path) -> None:
+    daemon = Daemon(Settings(SimulatedFc()), Host(tmp_path))
+    now, vehicle = daemon.started_at, daemon.bridge.vehicle
+    assert daemon.clock_trouble == ""
+    vehicle.hear_station_time(time.time() + 30, now)
+    assert daemon.clock_trouble == ""
+    vehicle.hear_station_time(time.time() + 86_400, now)
+    assert re.fullmatch(
+        r"the Pi's clock is 1 day, 0:00:0\d behind a ground station: sudo date --set '\+8640\d seconds'",
+        daemon.clock_trouble,
+    )
+    vehicle.hear_gps_time(now, Source.MSP, time.time() - 7200)
+    assert "2:00:00 ahead of the flight controller" in daemon.clock_trouble
+    (tmp_path / "run/systemd/timesync").mkdir(parents=True)
+    (tmp_path / "run/systemd/timesync/synchronized").touch()
+    assert daemon.clock_trouble == ""
 
 
 async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ import pytest
 from structlog.testing import capture_logs
 
 from service.recording.tlog_folder import LEFT_FREE, TlogFolder
-from service.settings import TlogLimits
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, tzinfo=UTC)
 RECORD_SIZE = 100
 PLENTY = 1 << 40
+MOST = 256 << 20
 
 
 def record(at: datetime = NOON) -> bytes:
@@ -34,7 +34,7 @@ def fill(folder: TlogFolder, began: datetime, records: int, *, is_flight: bool =
 
 
 def test_files_are_named_after_their_first_record_in_utc(tmp_path: Path) -> None:
-    folder = TlogFolder(tmp_path / "state" / "logs", TlogLimits())
+    folder = TlogFolder(tmp_path / "state" / "logs", MOST)
     fill(folder, NOON, 3)
     fill(folder, NOON + timedelta(hours=1, seconds=7), 1)
     assert names(tmp_path / "state" / "logs") == ["2026-11-21 12-00-00.tlog", "2026-11-21 13-00-07.tlog"]
@@ -42,7 +42,7 @@ def test_files_are_named_after_their_first_record_in_utc(tmp_path: Path) -> None
 
 
 def test_a_clock_that_was_set_back_does_not_overwrite_anything(tmp_path: Path) -> None:
-    folder = TlogFolder(tmp_path, TlogLimits())
+    folder = TlogFolder(tmp_path, MOST)
     for count in (1, 2, 3):
         fill(folder, NOON, count)
     assert names(tmp_path) == [f"2026-11-21 12-00-0{second}.tlog" for second in (0, 1, 2)]
@@ -51,54 +51,46 @@ def test_a_clock_that_was_set_back_does_not_overwrite_anything(tmp_path: Path) -
 
 def test_records_are_in_the_file_at_once(tmp_path: Path) -> None:
     """There is no buffer to be lost with the process."""
-    folder = TlogFolder(tmp_path, TlogLimits())
+    folder = TlogFolder(tmp_path, MOST)
     folder.write(record(), 0.0)
     assert (tmp_path / "2026-11-21 12-00-00.tlog").read_bytes() == record()
     folder.close()
 
 
 def test_the_oldest_files_are_deleted_to_keep_the_total_size(tmp_path: Path) -> None:
-    limits = TlogLimits(file_size=1000, total_size=5000)
-    folder = TlogFolder(tmp_path, limits)
-    for hour in range(12):
+    most = 16_000
+    folder = TlogFolder(tmp_path, most)
+    for hour in range(20):
         began = NOON + timedelta(hours=hour)
         while not folder.is_full:
             folder.write(record(began), 0.0)
-            assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= limits.total_size
+            assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= most
         folder.close()
-    assert names(tmp_path) == [f"2026-11-21 {hour}-00-00.tlog" for hour in range(19, 24)]
+    assert names(tmp_path) == [
+        (NOON + timedelta(hours=hour)).strftime("%Y-%m-%d %H-%M-%S.tlog") for hour in range(4, 20)
+    ]
 
 
-def test_flights_are_deleted_last_and_not_for_their_age(tmp_path: Path) -> None:
-    folder = TlogFolder(tmp_path, TlogLimits(file_size=1000, total_size=3000, days=30))
+def test_flights_are_deleted_last(tmp_path: Path) -> None:
+    folder = TlogFolder(tmp_path, 3000)
     fill(folder, NOON, 5, is_flight=True)
     for minute in range(1, 9):
         fill(folder, NOON + timedelta(minutes=minute), 10)
     assert names(tmp_path)[0] == "2026-11-21 12-00-00 flight.tlog"
-    assert len(names(tmp_path)) == 3
-    # The next start, at home: the network sets the clock, which was months behind on the field.
-    fill(TlogFolder(tmp_path, TlogLimits(days=30)), NOON + timedelta(days=90), 1)
-    assert names(tmp_path) == ["2026-11-21 12-00-00 flight.tlog", "2027-02-19 12-00-00.tlog"]
-
-
-def test_files_that_are_too_old_are_deleted(tmp_path: Path) -> None:
-    for days in (31, 30, 1):
-        fill(TlogFolder(tmp_path, TlogLimits()), NOON - timedelta(days=days), 1)
-    fill(TlogFolder(tmp_path, TlogLimits(days=30)), NOON + timedelta(seconds=1), 1)
-    assert names(tmp_path) == ["2026-11-20 12-00-00.tlog", "2026-11-21 12-00-01.tlog"]
+    assert len(names(tmp_path)) == 4
 
 
 def test_other_files_are_not_touched(tmp_path: Path) -> None:
     others = ["2020-01-01 00-00-00.tlog.bak", "2020-01-01 00-00-00.rlog", "flight.tlog", "notes.txt"]
     for name in others:
         (tmp_path / name).write_bytes(bytes(10_000))
-    fill(TlogFolder(tmp_path, TlogLimits(file_size=1000, total_size=2000)), NOON, 1)
+    fill(TlogFolder(tmp_path, 2000), NOON, 1)
     assert names(tmp_path) == sorted([*others, "2026-11-21 12-00-00.tlog"])
 
 
 def test_an_unusable_folder_is_reported_once_and_retried(tmp_path: Path) -> None:
     (tmp_path / "logs").write_text("in the way")
-    folder = TlogFolder(tmp_path / "logs", TlogLimits())
+    folder = TlogFolder(tmp_path / "logs", MOST)
     with capture_logs() as events:
         for second in range(200):
             folder.write(record(NOON + timedelta(seconds=second)), float(second))
@@ -118,7 +110,7 @@ def test_an_unusable_folder_is_reported_once_and_retried(tmp_path: Path) -> None
 @pytest.mark.parametrize("is_recording", [False, True])
 def test_does_not_write_to_a_nearly_full_disk(tmp_path: Path, is_recording: bool) -> None:
     free = [PLENTY]
-    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
+    folder = TlogFolder(tmp_path, MOST, lambda _: free[0])
     if is_recording:
         folder.write(record(), 0.0)
     free[0] = LEFT_FREE
@@ -135,7 +127,7 @@ def test_does_not_write_to_a_nearly_full_disk(tmp_path: Path, is_recording: bool
 
 def test_a_full_disk_is_reported_once_and_complete_records_can_be_read(tmp_path: Path) -> None:
     """The kernel fails a write within a record; a file size limit stands in for the full disk."""
-    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: PLENTY)
+    folder = TlogFolder(tmp_path, MOST, lambda _: PLENTY)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (250, hard))
     try:
@@ -158,7 +150,7 @@ def test_a_disk_that_becomes_read_only_does_not_end_recording(tmp_path: Path, mo
         raise OSError(errno.EROFS, "Read-only file system")
 
     free = [0]
-    folder = TlogFolder(tmp_path, TlogLimits(), lambda _: free[0])
+    folder = TlogFolder(tmp_path, MOST, lambda _: free[0])
     with monkeypatch.context() as failing:
         failing.setattr(Path, "unlink", refuse)
         folder.write(record(), 0.0)

@@ -9,7 +9,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from service.recording.tlog_recorder import TlogRecorder
-from service.settings import TlogLimits
 from tests.support.programs import TIMEOUT_S
 from tests.support.tlog import read_tlog
 
@@ -24,7 +23,7 @@ def frame(number: int) -> bytes:
 @pytest.mark.parametrize("step_ns", [100 * HOUR_NS, -HOUR_NS])
 def test_a_step_of_the_clock_begins_a_new_file(tmp_path: Path, step_ns: int) -> None:
     ahead_ns = 0
-    recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
+    recorder = TlogRecorder(tmp_path, 256 << 20, lambda: time.time_ns() + ahead_ns)
     deadline = time.monotonic() + TIMEOUT_S
     for number in count():
         recorder.record([frame(number)])
@@ -58,7 +57,7 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     station = heartbeat(messages.MAV_TYPE_GCS, 245, version=version)
     vehicle = heartbeat(messages.MAV_TYPE_QUADROTOR, 1, version=version)
     ahead_ns = 0
-    recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + ahead_ns)
+    recorder = TlogRecorder(tmp_path, 256 << 20, lambda: time.time_ns() + ahead_ns)
     recorder.record([station, frame(1)])
     recorder.record([frame(2), station, vehicle, station])
     deadline = time.monotonic() + TIMEOUT_S
@@ -81,7 +80,7 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
 
 def test_a_small_correction_of_the_clock_does_not_change_anything(tmp_path: Path) -> None:
     corrections = count(step=10**8)
-    recorder = TlogRecorder(tmp_path, TlogLimits(), lambda: time.time_ns() + next(corrections))
+    recorder = TlogRecorder(tmp_path, 256 << 20, lambda: time.time_ns() + next(corrections))
     deadline = time.monotonic() + TIMEOUT_S
     while not any(path.stat().st_size > 200 for path in tmp_path.iterdir()):
         recorder.record([frame(1)])

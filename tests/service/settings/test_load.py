@@ -49,12 +49,12 @@ takeof_max_m = 15
 vehicle = "a/b"
 profiles = "metered"
 """
-    lines = problems(folder, text, setup="tlog_days = 'all'")
+    lines = problems(folder, text, setup="tlog_total_mb = 'all'")
     wanted = [
         "naze.toml:8: 'takeof_max_m' is not a setting; did you mean 'takeoff_max_m'?",
         "naze.toml:11: 'zenoh.profiles' is not a setting; did you mean 'zenoh.profile'?",
         "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port: use udpin:0.0.0.0:14550",
-        "setup.toml:1: tlog_days is 'all', but must be a whole number, 1..3650 (How long",
+        "setup.toml:1: tlog_total_mb is 'all', but must be a whole number, 2..1048576 (Size",
         "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
         "naze.toml:10: zenoh.vehicle is 'a/b', with '/' in it: make a name of letters, digits and dashes",
     ]
@@ -105,11 +105,11 @@ def test_check_config_reports_success_or_errors(folder: Path) -> None:
     config.write_text('fc = "/dev/serial0"')
     ended = run_naze_bridge("run", "--check-config", "--config", config)
     assert (ended.returncode, ended.stdout) == (0, "The settings are valid.\n")
-    config.write_text('fc = "/dev/serial0"\nsysid = 0\ntlog_days = 0\n')
+    config.write_text('fc = "/dev/serial0"\nsysid = 0\ntlog_total_mb = 0\n')
     ended = run_naze_bridge("run", "--check-config", "--config", config)
     assert ended.returncode == 2
     assert f"{config}:2: sysid is 0" in ended.stderr
-    assert f"{config}:3: tlog_days is 0" in ended.stderr
+    assert f"{config}:3: tlog_total_mb is 0" in ended.stderr
     assert not (folder / "missions.db").exists()
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from service.settings import Settings, SettingsError, TlogLimits, load_settings
+from service.settings import Settings, SettingsError, load_settings
 
 
 def settings_of(tmp_path: Path, text: str) -> Settings:
@@ -14,25 +14,18 @@ def settings_of(tmp_path: Path, text: str) -> Settings:
 
 
 def test_telemetry_is_recorded_by_default(tmp_path: Path) -> None:
-    assert settings_of(tmp_path, "").tlog == TlogLimits(file_size=16 << 20, total_size=256 << 20, days=30)
-    assert settings_of(tmp_path, "record_tlog = false\ntlog_days = 3").tlog is None
-
-
-def test_the_limits_are_settings(tmp_path: Path) -> None:
-    limits = settings_of(tmp_path, "tlog_file_mb = 200\ntlog_days = 365").tlog
-    assert limits == TlogLimits(file_size=200 << 20, total_size=400 << 20, days=365)
-    limits = settings_of(tmp_path, "tlog_file_mb = 1\ntlog_total_mb = 2\ntlog_days = 1").tlog
-    assert limits == TlogLimits(file_size=1 << 20, total_size=2 << 20, days=1)
+    assert settings_of(tmp_path, "").tlog == 256 << 20
+    assert settings_of(tmp_path, "tlog_total_mb = 2").tlog == 2 << 20
+    assert settings_of(tmp_path, "record_tlog = false\ntlog_total_mb = 3").tlog is None
 
 
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
         ("record_tlog = 1", "record_tlog is 1, but must be true or false"),
-        ("tlog_days = true", "tlog_days is True, but must be a whole number"),
-        ("tlog_days = 0", "tlog_days is 0, but must be 1..3650"),
-        ("tlog_file_mb = 2000", "tlog_file_mb is 2000, but must be 1..1024"),
-        ("tlog_day = 20", "did you mean 'tlog_days'"),
+        ("tlog_total_mb = true", "tlog_total_mb is True, but must be a whole number"),
+        ("tlog_total_mb = 0", "tlog_total_mb is 0, but must be 2..1048576"),
+        ("tlog_total = 20", "did you mean 'tlog_total_mb'"),
         ("key_file = true", "key_file is True, but must be text in quotes"),
     ],
 )

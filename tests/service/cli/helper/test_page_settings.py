@@ -43,9 +43,9 @@ def test_a_live_setting_is_taken_over_without_a_restart(pi: FixablePi) -> None:
 
 
 def test_null_is_the_default_again(pi: FixablePi) -> None:
-    pi.ask("settings", values={"sysid": 7, "tlog_days": 9})
+    pi.ask("settings", values={"sysid": 7, "tlog_total_mb": 9})
     pi.ask("settings", values={"sysid": None})
-    assert page_file(pi) == {"tlog_days": 9}
+    assert page_file(pi) == {"tlog_total_mb": 9}
 
 
 _WRONG: Mapping[str, Sequence[object]] = {
@@ -102,5 +102,5 @@ def test_odd_values_written_by_hand_are_shown_as_text(pi: FixablePi) -> None:
 
 def test_every_setting_of_the_page_has_choices(pi: FixablePi) -> None:
     names = [each["name"] for each in pi.ask("overview")["settings"]]
-    assert len(names) == 7
+    assert len(names) == 5
     assert all(key.reader.choices for key in KEYS if key.name in names)
