@@ -138,11 +138,6 @@ def _no_places(_board: "FlightController", _vehicle: Vehicle) -> Refusal:
     return NO_PLACES
 
 
-def _none_known(_vehicle: Vehicle, _now: float) -> tuple[str, ...]:
-    """The reasons that prevent arming, on firmware that does not report them."""
-    return ()
-
-
 @dataclass(frozen=True, slots=True)
 class Profile:
     """One kind of flight controller, on one protocol.
@@ -190,7 +185,7 @@ class Profile:
     mavlink_readings: type[MavlinkReadings] = MavlinkReadings
     mavlink_sender: tuple[int, int, int] | None = None
     restarts_after_calibration: bool = False
-    arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = _none_known
+    arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = lambda _vehicle, _now: ()
     calibrates_six_positions: bool = False
     notice: Sentence[()] | None = None
 

@@ -29,7 +29,9 @@ def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Map
     """
     short = {name: _short(name).upper() for name in settings}
     often = Counter([*short.values(), *taken])
-    return {_hashed(name) if often[parameter] > 1 else parameter: name for name, parameter in short.items()}
+    # Of names that would coincide: the beginning, and three digits of a checksum of the whole name.
+    distinct = {name: f"{name[: LONGEST - 4]}~{crc32(name.encode()) & 0xFFF:03x}".upper() for name in short}
+    return {distinct[name] if often[parameter] > 1 else parameter: name for name, parameter in short.items()}
 
 
 def _short(name: str) -> str:
@@ -46,8 +48,3 @@ def _short(name: str) -> str:
             return "".join(words)[:LONGEST]
         words[longest] = words[longest][:-1]
     return "_".join(words)
-
-
-def _hashed(name: str) -> str:
-    """For names that would coincide: the beginning, and three digits of a checksum of the whole name."""
-    return f"{name[: LONGEST - 4]}~{crc32(name.encode()) & 0xFFF:03x}".upper()

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl's .plan and Mission Planner's .mission (JSON; docs.qgroundcontrol.com, "Plan File Format").
 
-A fence and rally points next to a mission are ignored with a note. QGroundControl's .mission files of 2015 to 2017
-(version "1.0") are read, too: they are only the mission, with home as an item.
+A fence and rally points next to a mission are ignored with a note.
 An item's frame and params are as QGroundControl would send them; AltitudeMode only records their origin.
 Surveys and corridor scans list the plain items they are flown as; these are read. The planned home position becomes
 item 0, as QGroundControl sends it to an ArduPilot vehicle.
@@ -28,7 +27,7 @@ _SAVE_AGAIN = "save it again from QGroundControl"
 
 def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
     """Read the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
-    plan = _as_plan(_parse(text, name), name)
+    plan = _parse(text, name)
     if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
         what = 'this is not a QGroundControl plan, its fileType is not "Plan"'
         raise MissionFileError(name, "", what, _SAVE_AGAIN)
@@ -59,25 +58,6 @@ def _refuse_unknown_version(version: Any, known: tuple[int, ...], what: str, nam
         known_ones = " and ".join(map(str, known))
         text = f"{what} is of version {shown(version)}, and only {known_ones} can be read here"
         raise MissionFileError(name, "", text, "open it in QGroundControl and save it as .plan")
-
-
-def _as_plan(plan: Any, name: str) -> Any:
-    """A mission of version "1.0" in the form of a plan; anything else unchanged."""
-    if not isinstance(plan, dict) or plan.get("version") != "1.0" or not isinstance(plan.get("items"), list):
-        return plan
-    if plan.get("complexItems"):
-        what, remedy = "it holds a survey of an old version", "open it in QGroundControl and save it as .plan"
-        raise MissionFileError(name, "", what, remedy)
-    home = plan.get("plannedHomePosition")
-    place = home.get("coordinate") if isinstance(home, dict) else home
-    params = [f"param{number}" for number in range(1, 5)]
-    items = [
-        entry | {"type": "SimpleItem", "params": [entry.get(param) for param in params]}
-        if isinstance(entry, dict)
-        else entry
-        for entry in plan["items"]
-    ]
-    return {"mission": {"items": items, "plannedHomePosition": place}, "fileType": "Plan"}
 
 
 def _other_parts(plan: dict[str, Any]) -> str:

@@ -95,25 +95,17 @@ class _StandardError:
     debug = info = warning = error = msg
 
 
-class _LeastLevel:
-    """Drops events below the level, which may change at run time."""
+class _Limits:
+    """Keeps repeated events from flooding the log. The number of suppressed ones is logged with the next line."""
 
     def __init__(self) -> None:
+        #: Events of less weight are dropped. It may change at run time.
         self.level = "info"
+        self._seen: dict[str, tuple[float, int]] = {}
 
     def __call__(self, _logger: object, method: str, event: EventDict) -> EventDict:
         if _WEIGHTS[method] < _WEIGHTS[self.level]:
             raise structlog.DropEvent
-        return event
-
-
-class _RateLimit:
-    """Keeps repeated events from flooding the log. The number of suppressed ones is logged with the next line."""
-
-    def __init__(self) -> None:
-        self._seen: dict[str, tuple[float, int]] = {}
-
-    def __call__(self, _logger: object, _method: str, event: EventDict) -> EventDict:
         now = time.monotonic()
         over = [(name, count) for name, (began, count) in self._seen.items() if now >= began + _WITHIN_S]
         for name, _ in over:
@@ -154,7 +146,7 @@ def _safe(_logger: object, _method: str, event: EventDict) -> EventDict:
     return {key: value if key == "exception" else printable(value) for key, value in event.items()}
 
 
-_least_level = _LeastLevel()
+_limits = _Limits()
 _recent = _Recent()
 
 
@@ -174,7 +166,7 @@ def warn_once(known: set[str], event: str, /, **facts: object) -> None:
 
 
 def set_log_level(level: str) -> None:
-    _least_level.level = level
+    _limits.level = level
 
 
 def recent_lines(after: int) -> tuple[int, list[LogLine]]:
@@ -189,8 +181,7 @@ def set_up_logging(level: str) -> None:
     logging.basicConfig(handlers=[_FromLibraries()], level=logging.WARNING, force=True)
     structlog.configure(
         processors=[
-            _least_level,
-            _RateLimit(),
+            _limits,
             structlog.processors.add_log_level,
             structlog.processors.format_exc_info,
             _recent,

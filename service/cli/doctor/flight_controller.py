@@ -39,9 +39,6 @@ def check_flight_controller(
     `running`: a daemon's status; `ask_port` returns one or raises ControlError. `source`: where `fc` is set.
     `mini_uart_config`: the path of config.txt if the port is the mini-UART.
     """
-    found = _check(fc, running, ask_port, source)
-    if not mini_uart_config:
-        return found
     better = f"printf '\\n[all]\\ndtoverlay=disable-bt\\n' | sudo tee -a {mini_uart_config} && sudo reboot"
     return [
         replace(
@@ -49,9 +46,9 @@ def check_flight_controller(
             found=f"{each.found}; the port is the mini-UART",
             remedy=f"{each.remedy} If all that is right, give the header Bluetooth's UART: {better}",
         )
-        if each.check == "flight controller" and each.grade is Grade.PROBLEM
+        if mini_uart_config and each.check == "flight controller" and each.grade is Grade.PROBLEM
         else each
-        for each in found
+        for each in _check(fc, running, ask_port, source)
     ]
 
 

@@ -26,14 +26,10 @@ _WANTED_BY = "/etc/systemd/system/multi-user.target.wants/naze-bridge.service"
 
 def missing_steps(host: Host, answers: SetupChoices) -> list[Step]:
     """The remaining steps on this machine, in order."""
-    makers = (_console, uart_steps, _country, _name, _key, settings_steps, _announcement, _service)
-    steps = [step for make in makers for step in make(host, answers)]
+    makers = (uart_steps, _country, _name, _key, settings_steps, _announcement, _service)
+    steps = [*console_steps(host, header_consoles(host)), *(step for make in makers for step in make(host, answers))]
     steps += captive_steps(host, answers.hotspot, has_page=answers.page)
     return [*steps, *hotspot_steps(host, answers.hotspot, is_kept=answers.keeps_hotspot)]
-
-
-def _console(host: Host, answers: SetupChoices) -> Iterator[Step]:
-    return console_steps(host, header_consoles(host))
 
 
 def console_steps(host: Host, consoles: Sequence[str]) -> Iterator[Step]:
