@@ -200,6 +200,9 @@ class MissionUploads:
             if now >= state.deadline:
                 self._handle(upload, Ended(state.timeout), now)
             elif now >= state.due:
+                if state.received:
+                    # Without items, a station there may have started again, and would take it for its own list's.
+                    self._follow(upload, now)
                 self._request(upload, *state.repeats(now))
         self.answers.tick(now)
         for upload in self._queue.within(Waiting, Complete):
@@ -353,14 +356,26 @@ class MissionUploads:
     def _of(self, sender: Sender) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
         for upload in reversed(self._queue.uploads):
+            if (upload.sender.sysid, upload.sender.compid) == (sender.sysid, sender.compid):
+                self._follow(upload, sender.station.heard_at)
             if upload.sender == sender:
                 return upload
         return None
+
+    def _follow(self, upload: Upload, now: float) -> None:
+        """A station whose address has changed goes on from there, unless it has begun another list there."""
+        there = self._ground.moved(upload.sender, now)
+        if there is upload.sender or self.answers.has_answered(there, now):
+            return
+        upload.sender = there
+        if isinstance(upload.state, Receiving):
+            upload.state.list.moved()
 
     def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:
         state = upload.state
         if isinstance(state, DeliveringUnanswered):
             return
+        self._follow(upload, now)
         is_cancelled, is_repeated = isinstance(state, DeliveringDespiteCancel), isinstance(state, Delivering)
         to, count, kind = upload.sender, upload.count, upload.mission_type
         self.answers.end(to, ack, count, now, kind, is_cancelled=is_cancelled, is_repeated=is_repeated)
