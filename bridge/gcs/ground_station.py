@@ -31,7 +31,7 @@ _MAX_SENDERS = 64
 _SETUP = "set the key in naze-bridge's settings"
 _ADDRESS = "this address may only read"
 #: At most 50 characters with "Refused: ".
-_NOT_OVER_OPEN_LINK = "open link; see pass_through in settings"
+_NOT_OVER_OPEN_LINK = "needs a key, or pass_through = everything"
 #: Ground stations and radios repeat these.
 _ROUTINE = Effect.RATE, Effect.SILENCE
 #: A frame whose number is at most this far behind the newest one was delayed by the network.

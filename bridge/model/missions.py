@@ -107,9 +107,13 @@ class Download:
 
 @dataclass(slots=True)
 class TransferMemory:
-    """One station's running download, and the answer to the last upload, of one mission type."""
+    """One station's running download, and the answer to the last upload, of one mission type.
+
+    has_asked: for a list that could not be read, as programs do at each connection.
+    """
 
     download: Download | None = None
+    has_asked: bool = False
     final_ack: FinalAck | None = None
 
 

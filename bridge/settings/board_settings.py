@@ -16,6 +16,7 @@ from bridge.gcs.ground import Ground
 from bridge.line.conversation import Conversation, LinkLost, Pause, ask_surely
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import BridgeEvent, SettingChanged, SettingsChangedOnBoard, SettingsRead, SettingsSaved
+from bridge.model.missions import Refusal
 from bridge.model.settings import BoardId, SettingsChange, SettingsMemory, SettingTable, TakenBackup, Value, shown
 from bridge.settings.known_settings import Freshness, KnownSettings
 from bridge.settings.setting_work import Answer, OnDone, SettingChange, SettingsSave, SettingWork, WorkEvent
@@ -98,7 +99,10 @@ class BoardSettings:
 
     def obstacle(self) -> SettingRefusal | None:
         """The reason why settings can be neither read nor changed now, or None if they can."""
-        armed = self._session.vehicle.armed
+        armed, missions = self._session.vehicle.armed, self._missions.fc_store
+        if self._controller is None and isinstance(missions, Refusal):
+            # It is lost, was never found, or calibrates.
+            return SettingRefusal(Cause.NO_LINK, missions.why)
         if armed:
             return ARMED
         if self._fc_settings is None:

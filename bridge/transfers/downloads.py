@@ -94,19 +94,20 @@ class MissionDownloads:
             self._answer(question, held.items, now)
 
     def _answer_unread(self, question: _Question, why: Refusal, now: float) -> None:
-        sender, vehicle = question.sender, self._vehicle
-        if not self._has_home:
-            sender.refuse(why, self._missions.mission_type)
-        elif question.seq == 0 and (vehicle.armed or vehicle.home_or_position() is not None):
+        sender, vehicle, kind = question.sender, self._vehicle, question.sender.station.behaviour.kind
+        is_missing = self._has_home and (vehicle.armed or isinstance(self._missions.fc_store, Refusal))
+        if question.seq is None and (is_missing or kind is Kind.QGROUNDCONTROL):
+            # QGroundControl reads at each connection (InitialConnectStateMachine): a refusal would be a dialog. Later
+            # requests are its pilot's, and each of Mission Planner's.
+            memory = self._memory(sender)
+            is_pilots, memory.has_asked = memory.has_asked or kind is Kind.MISSION_PLANNER, True
+            sender.say(why.why if is_pilots else sentences.NO_LIST(why.text))
+            self._answer(question, (), now)
+        elif question.seq == 0 and self._has_home and (vehicle.armed or vehicle.home_or_position() is not None):
             # Mission Planner requests item 0 on arming, which may have just changed the protocol.
             self._send_home(question, now)
-        elif question.seq is None and (vehicle.armed or isinstance(self._missions.fc_store, Refusal)):
-            # QGroundControl reads at each connection: a refusal would be a dialog. Mission Planner has a button for it.
-            is_button = sender.station.behaviour.kind is Kind.MISSION_PLANNER
-            sender.say(why.why if is_button else sentences.NO_LIST(why.text))
-            self._answer(question, (), now)
         elif question.seq != 0 or vehicle.armed is not None:
-            sender.refuse(why)
+            sender.refuse(why, self._missions.mission_type)
         # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
 
     def _answer(self, question: _Question, items: tuple[MissionItem, ...], now: float) -> None:

@@ -83,7 +83,7 @@ class ActionResult(Enum):
     DONE = "", CommandResult.ACCEPTED
     FREEZES = "restarts", CommandResult.ACCEPTED
     ARMED = "armed", CommandResult.DENIED
-    NO_LINK = "no MSP link", CommandResult.DENIED
+    NO_BOARD = "no flight controller", CommandResult.DENIED
     OCCUPIED = "a transfer is running", CommandResult.TEMPORARILY_REJECTED
     NO_SENSOR = "no such sensor", CommandResult.DENIED
     SIX_POSITIONS = "use INAV Configurator", CommandResult.UNSUPPORTED
@@ -132,13 +132,14 @@ class Calibration:
     def _start(self, sender: Sender, command: int, action: FcAction, now: float) -> ActionResult | None:
         """Ask the flight controller. The reason if that cannot be done now."""
         controller = self._session.state.controller
-        if controller is None or controller.arm_bit is None:
-            # Without an arm flag it is unknown whether the craft is flying.
-            return ActionResult.NO_LINK
-        if msp_right(controller.firmware, action.command, b"").effect is not Effect.CHANGE:
-            return ActionResult.REFUSED
+        if controller is None:
+            return ActionResult.NO_BOARD
         if self._session.vehicle.armed:
             return ActionResult.ARMED
+        is_action = msp_right(controller.firmware, action.command, b"").effect is Effect.CHANGE
+        if controller.arm_bit is None or not is_action:
+            # Without an arm flag it is unknown whether the craft is flying.
+            return ActionResult.REFUSED
         if action is CALIBRATE_ACCELEROMETER and controller.profile.calibrates_six_positions:
             return ActionResult.SIX_POSITIONS
         if self._missions.runner.needs_line or self._missions.acquire(self) is not None:

@@ -23,6 +23,7 @@ from bridge.settings.parameters import Parameters
 from bridge.settings.setting_work import Answer
 from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, Calibration, FcAction
 from bridge.vehicle.own_vehicle import OwnVehicle
+from bridge.vehicle.readiness import ReadyState
 from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from bridge.voice import sentences
@@ -135,16 +136,20 @@ class CommandService:
             command = messages.MAV_CMD_COMPONENT_ARM_DISARM  # Mission Planner's "Toggle Safety Switch"
         is_auto = command == messages.MAV_CMD_DO_SET_MODE and mode[1] == auto_mode(self._session.vehicle)
         of_mission = self._mission_refusal() if is_auto or command in _OF_A_MISSION else None
-        if not self._vehicle.readiness.has_board:
-            sender.say(sentences.NO_BOARD_TO_COMMAND())
-        elif command == messages.MAV_CMD_DO_FENCE_ENABLE and self._vehicle.stores_fences:
-            sender.say(sentences.FENCE_SWITCH())
+        if command == messages.MAV_CMD_DO_FENCE_ENABLE and self._vehicle.stores_fences:
+            self.tell(sender, sentences.FENCE_SWITCH())
         else:
-            sender.say(of_mission or _REFUSED[command]())
+            self.tell(sender, of_mission or _REFUSED[command]())
+
+    def tell(self, sender: Sender, why: Happening) -> None:
+        """Give the reason why a button has no effect, which is another one without a flight controller."""
+        sender.say(why if self._vehicle.readiness.has_board else sentences.NO_BOARD_TO_COMMAND())
 
     def _mission_refusal(self) -> Happening | None:
-        """The switch that flies the mission, or that none does, or None if that is not known."""
+        """The switch that flies the mission, or that none does now, or None if that is not known."""
         controller, vehicle = self._session.state.controller, self._session.vehicle
+        if self._vehicle.readiness.state is ReadyState.CALIBRATING:
+            return sentences.CALIBRATING_NOW()
         if vehicle.last(MissionLeg) is None:
             is_asked = controller is not None and controller.profile.spoken is Spoken.MSP
             return sentences.FLIES_NO_MISSIONS() if is_asked else None
@@ -194,7 +199,7 @@ class CommandService:
             return CommandResult.DENIED
         name = command_name(command)
         if not (name.isdigit() or name.startswith(_ASKED_BY_PROGRAMS)):
-            sender.say(sentences.NO_EFFECT(name))
+            self.tell(sender, sentences.NO_EFFECT(name))
         return CommandResult.UNSUPPORTED
 
     def _store(self, sender: Sender, command: int, what: float, now: float) -> None:

@@ -196,7 +196,7 @@ class MessageRouter:
             message = decode(frame)
             if message is None or all(getattr(message, f"chan{n}_raw") in _NO_OVERRIDE for n in range(1, 9)):
                 return
-        sender.say(_TOLD[msgid]())
+        self._commands.tell(sender, _TOLD[msgid]())
 
     def _ping(self, sender: Sender, message: Message, _now: float) -> None:
         if message.target_system != 0:

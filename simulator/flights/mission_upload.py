@@ -35,7 +35,7 @@ def require_mission_flight(console: Console, name: str) -> None:
     """UnfitImageError unless the firmware stores missions and flies them."""
     if console.exchange(INFO_REQUEST, MissionCommand.INFO) is None:
         raise UnfitImageError(
-            f"{name} stores no missions: build it with the patch, firmware/apply (firmware/README.md)"
+            f"{name} cannot store missions: build it with the patch, firmware/apply (firmware/README.md)"
         )
     progress = progress_of(console)
     if progress is None:

@@ -412,6 +412,6 @@ def test_set_wp_is_refused_at_once_with_one_text(shared: Bench) -> None:
     planner.request_streams()
     planner.texts.clear()
     assert planner.set_current(2) == 1
-    planner.wait_for_text("This flight controller flies no missions")
+    planner.wait_for_text("This flight controller cannot fly missions")
     planner.listen(2)
-    assert planner.joined_texts().count("flies no missions") == 1
+    assert planner.joined_texts().count("cannot fly missions") == 1

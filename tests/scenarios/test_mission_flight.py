@@ -272,7 +272,7 @@ def replies(world: World, message: Message) -> tuple[list[str], list[int]]:
 def test_only_the_pilots_switch_flies_a_mission(tele_prot: TelemetryProtocol, message: Message) -> None:
     flight = Flight(tele_prot)
     texts, results = replies(flight.world, message)
-    assert texts == ["Only the switch GPS AUTO flies the mission"]
+    assert texts == ["Use the GPS AUTO switch to fly the mission"]
     assert set(results) <= {m.MAV_RESULT_DENIED}
 
 
@@ -281,7 +281,7 @@ def test_a_board_without_mission_flight_says_so(message: Message) -> None:
     world = World()
     world.wait_ready()
     world.run(2)
-    assert replies(world, message)[0] == ["This flight controller flies no missions"]
+    assert replies(world, message)[0] == ["This flight controller cannot fly missions"]
 
 
 @pytest.mark.parametrize("message", refused(LOITER)[2:], ids=lambda it: it.get_type())

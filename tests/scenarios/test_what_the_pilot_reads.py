@@ -414,8 +414,8 @@ def test_a_mission_of_an_inav_is_told_in_the_words_of_the_osd() -> None:
     world.run(60)
     words = ["TO WP 1/3", "TO WP 3/3", "WP END>HOLDING POSITION"]
     assert [text for text in screens.mission_planner.texts(began) if text.isupper() or "TO WP" in text] == words
-    assert screens.qgc.heard(began) == ["Set WP: only in flight, in the mode NAV WP", *words]
-    assert screens.mission_planner.heard(began) == ["Set WP: only in flight, in the mode NAV WP"]
+    assert screens.qgc.heard(began) == ["Set WP: only in flight, in NAV WP mode", *words]
+    assert screens.mission_planner.heard(began) == ["Set WP: only in flight, in NAV WP mode"]
     assert screens.glance().hud == ""
 
 

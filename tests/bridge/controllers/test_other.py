@@ -28,7 +28,7 @@ def test_other_firmware_is_telemetry_only(name: bytes) -> None:
     world.run(1)
     assert world.bridge.vehicle.armed is True
     assert Upload(station, plan(5)).run() is MissionResult.UNSUPPORTED
-    assert any("stores no missions" in text for text in station.texts())
+    assert any("cannot store missions" in text for text in station.texts())
     assert not {Nav.SET_WP, Nav.SAVE, Nav.LOAD} & set(board.commands)
 
 

@@ -403,7 +403,7 @@ def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> N
         station.send(command_of_storage(what))
         world.run(1)
         assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
-        assert station.texts() == ["Settings are only saved, not loaded or reset"]
+        assert station.texts() == ["Settings can be saved, but not loaded or reset"]
 
 
 def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:

@@ -286,7 +286,7 @@ def test_without_a_link_and_without_a_store_the_list_is_empty_and_the_reason_rep
     station = GroundStation(other)
     (count,) = ask(station, list_message())
     assert count.count == 0
-    assert "stores no missions" in " ".join(station.texts())
+    assert "cannot store missions" in " ".join(station.texts())
 
 
 BOARDS = [*TelemetryProtocol, "inav", "multiwii"]

@@ -15,7 +15,7 @@ def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
     assert station.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
     world.run(0.2)
     assert acks(station) == [A.DENIED]
-    assert station.texts() == ["Another mission transfer is running"]
+    assert station.texts() == ["Another mission transfer is running: try again"]
 
 
 def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
@@ -32,7 +32,7 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     world.run(0.02)
     assert state(world) is Delivering
     denied = world.push(waypoints(3))
-    assert denied[0][0].text == "Another mission transfer is running"
+    assert denied[0][0].text == "Another mission transfer is running: try again"
     world.run(1)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(waypoints(5))

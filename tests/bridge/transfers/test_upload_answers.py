@@ -39,7 +39,7 @@ def test_items_of_an_upload_begun_before_a_restart_are_refused_at_once() -> None
             station.send(item_message(seq, OLD[seq]))
         world.run(0.45)
     assert [message.type for message in station.messages("MISSION_ACK")] == [A.OPERATION_CANCELLED] * 9
-    assert station.texts() == ["Unknown upload: write it again"]
+    assert station.texts() == ["Unknown upload: write the mission again"]
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 

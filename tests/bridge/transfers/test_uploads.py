@@ -309,8 +309,8 @@ def test_an_upload_whose_turn_does_not_come_is_denied() -> None:
     assert second.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
     world.run(0.2)
     assert acks(second) == [A.DENIED]
-    assert second.texts() == ["Another mission transfer is running"]
-    assert "Another mission transfer is running" not in station.texts()
+    assert second.texts() == ["Another mission transfer is running: try again"]
+    assert "Another mission transfer is running: try again" not in station.texts()
     assert state(world) is Receiving
 
 
@@ -323,7 +323,7 @@ def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
     assert acks(station) == []
     world.run(0.2)
     assert acks(station) == [A.DENIED]
-    assert "Another mission transfer is running" in station.texts()
+    assert "Another mission transfer is running: try again" in station.texts()
     world.run(5)
     assert world.stored == records_of(waypoints(3))
 
@@ -510,7 +510,7 @@ def test_an_upload_to_a_harakiri_without_the_extension_is_unsupported() -> None:
 def test_an_upload_to_another_flight_controller_is_unsupported() -> None:
     world = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
     world.wait_until(lambda w: w.is_found, 3)
-    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "stores no missions")
+    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "cannot store missions")
 
 
 def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:

@@ -111,7 +111,7 @@ def test_settings_are_neither_loaded_nor_reset(what: float) -> None:
     station.send(long(STORAGE, (what, 0, 0, 0, 0, 0, 0)))
     world.run(0.3)
     assert results(station) == [DENIED]
-    assert station.texts() == ["Settings are only saved, not loaded or reset"]
+    assert station.texts() == ["Settings can be saved, but not loaded or reset"]
     assert done(world) == []
 
 
@@ -149,7 +149,7 @@ def test_without_a_flight_controller_an_action_is_denied() -> None:
         world.run(0.1)
     assert results(station) == [DENIED] * len(ALL)
     # The text of a refusal is not repeated.
-    assert station.texts() == [f"{name} calibration failed: no MSP link" for name in NAMES.values()]
+    assert station.texts() == [f"{name} calibration failed: no flight controller" for name in NAMES.values()]
 
 
 def test_on_unknown_firmware_an_action_is_unsupported() -> None:

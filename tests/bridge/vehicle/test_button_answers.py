@@ -14,7 +14,7 @@ from tests.support.qgc_upload import QGC_HEARTBEAT
 from tests.support.screens import Screens
 from tests.support.world import GroundStation, World
 
-JOYSTICK, CAMERA = "Joystick ignored: fly with the transmitter", "No camera or gimbal is controlled here"
+JOYSTICK, CAMERA = "Joystick ignored: fly with the transmitter", "Cameras and gimbals are not controlled here"
 #: Mission Planner's list "Actions": the command of each entry that was not answered by a text of its own.
 ACTIONS = {
     "Trigger Camera NOW": m.MAV_CMD_DO_DIGICAM_CONTROL,
@@ -109,7 +109,7 @@ def test_requests_of_the_program_itself_do_not_get_a_text(number: int) -> None:
         (m.MAVLink_set_gps_global_origin_message(1, 1, 1, 1), "The origin is home, set by the flight controller"),
         (
             m.MAVLink_set_home_position_message(1, 1, 1, 1, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0),
-            "Home is where the craft is armed",
+            "Home is set where the craft is armed",
         ),
     ],
     ids=["override", "manual control", "mount", "origin", "home"],

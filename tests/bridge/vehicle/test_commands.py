@@ -116,7 +116,7 @@ def test_all_command_numbers_are_acknowledged() -> None:
         (22, "transmitter"),
         (21, "transmitter"),
         (20, "transmitter"),
-        (224, "flies no missions"),
+        (224, "cannot fly missions"),
         (183, "cannot be driven"),  # servo
         (207, "no fence"),
     ],
@@ -170,7 +170,7 @@ def test_the_current_waypoint_cannot_be_set() -> None:
     world, asking, other = two_stations()
     asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
     world.run(3)
-    assert "This flight controller flies no missions" in asking.texts()
+    assert "This flight controller cannot fly missions" in asking.texts()
     assert asking.messages("MISSION_CURRENT") == []
     assert len(other.messages("MISSION_CURRENT")) == 3
     world.run(3)
@@ -197,9 +197,9 @@ def test_set_wp_in_mission_planner_ends_at_once() -> None:
         world.run(0.1)
         answers = [message.get_type() for message in asking.messages("STATUSTEXT", "MISSION_CURRENT")]
         assert answers[:2] == ["STATUSTEXT", "MISSION_CURRENT"]
-        assert not any("flies no missions" in text for text in other.texts())
+        assert not any("cannot fly missions" in text for text in other.texts())
         world.run(5)
-    assert len([text for text in asking.texts() if "flies no missions" in text]) == 1
+    assert len([text for text in asking.texts() if "cannot fly missions" in text]) == 1
 
 
 def test_a_command_for_another_system_is_not_answered(flying: tuple[World, GroundStation]) -> None:

@@ -182,7 +182,7 @@ def test_on_the_ground_and_outside_of_the_waypoint_mode_it_is_refused() -> None:
     flight.world.run(2)
     flight.ask(long(3))
     assert results(flight.station) == [DENIED, DENIED]
-    assert flight.station.texts().count("Set WP: only in flight, in the mode NAV WP") == 2
+    assert flight.station.texts().count("Set WP: only in flight, in NAV WP mode") == 2
     assert flight.sent() == []
 
 
@@ -270,7 +270,7 @@ def test_a_station_on_an_open_link_may_write_but_does_not_set_a_waypoint() -> No
     flight.ask(set_current(3))
     flight.ask(long(3))
     assert (results(flight.station), flight.sent(), flight.number) == ([DENIED], [], 1)
-    assert "Set WP: open link; see pass_through in settings" in flight.station.texts()
+    assert "Set WP: needs a key, or pass_through = everything" in flight.station.texts()
 
 
 def test_a_station_that_may_only_read_does_not_set_a_waypoint() -> None:
@@ -297,7 +297,7 @@ def test_without_a_known_mission_it_does_not_send_anything() -> None:
     station = GroundStation(world)
     station.send(long(1))
     world.run(0.5)
-    assert (results(station), station.texts()) == ([DENIED], ["Set WP: Read the mission on board first"])
+    assert (results(station), station.texts()) == ([DENIED], ["Set WP: read the mission from the board first"])
     assert 0x2221 not in inav.commands
 
 
@@ -309,4 +309,4 @@ def test_other_boards_refuse_it_as_before() -> None:
     station = GroundStation(world)
     station.send(long(1))
     world.run(0.5)
-    assert (results(station), station.texts()) == ([DENIED], ["Only the switch MISSION flies the mission"])
+    assert (results(station), station.texts()) == ([DENIED], ["Use the MISSION switch to fly the mission"])

@@ -80,7 +80,7 @@ def test_status_and_doctor_work(board: Board) -> None:
 
 
 def test_a_board_without_missions_gives_the_reason_and_the_status(other_board: Board, plan_file: Path) -> None:
-    sentence = "This flight controller stores no missions"
+    sentence = "This flight controller cannot store missions"
     for command in (("push", plan_file), ("clear",)):
         refused = run_naze_bridge(*command, "--fc", other_board.link)
         assert (refused.returncode, refused.stderr.strip()) == (1, "")

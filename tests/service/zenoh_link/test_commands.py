@@ -152,7 +152,7 @@ def test_only_one_transfer_runs_at_a_time(commanded: tuple[Bench, zenoh.Session]
     errors = [each["error"] for each in answers if "error" in each]
     assert len(results) >= 1
     assert len(results) + len(errors) == 6
-    assert set(errors) <= {"Another mission transfer is running"}
+    assert set(errors) <= {"Another mission transfer is running: try again"}
     verified = [each for each in bench.daemon.missions() if each["outcome"] == "VERIFIED"]
     assert f"{verified[0]['checksum']}" == bench.daemon.pull()["checksum"]
 

@@ -127,7 +127,7 @@ def test_does_not_send_anything_if_the_board_has_another_record_there(held: NavR
     inav = Inav()
     refusal = run(inav, held=held)
     assert refusal is not None
-    assert refusal.text == "Set WP: Read the mission on board first"
+    assert refusal.text == "Set WP: read the mission from the board first"
     assert inav.set_to == []
 
 

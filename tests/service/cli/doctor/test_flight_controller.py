@@ -57,7 +57,7 @@ def test_a_line_that_damages_replies(damaged: int, found_s: float | None, *, is_
 def test_stations_without_the_key() -> None:
     refused = [
         "7 x not signed (udpin:0.0.0.0:14550)",
-        "1 x open link; see pass_through in settings (udpin:0.0.0.0:14550)",
+        "1 x needs a key, or pass_through = everything (udpin:0.0.0.0:14550)",
     ]
     (found,) = check_running(STATUS | {"refused": refused})
     assert_note(found, "7 requests on udpin:0.0.0.0:14550 were refused: not signed")
