@@ -5,7 +5,7 @@ The service feeds in bytes, time and the store's answers, and then takes the eff
 The path of a byte from the UART:
     fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take
 The path of a mission item to the flight controller, and back for verification:
-    gcs_received -> Incoming -> GroundStation -> MessageRouter -> MissionUploads -> ListCheck
+    gcs_received -> Incoming -> GroundStation -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
     FcSession <-> Routes <-> Ground
@@ -47,7 +47,6 @@ from bridge.vehicle.calibration import Calibration
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.compass_check import CompassCheck
 from bridge.vehicle.incoming import Incoming
-from bridge.vehicle.message_router import MessageRouter
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.readiness import CraftReadiness
 from bridge.vehicle.set_waypoint import SetWaypoint
@@ -162,8 +161,7 @@ class Bridge:
         self._compass_check = CompassCheck(port.vehicle, ground)
         waypoint = SetWaypoint(missions, own, ground)
         commands = CommandService(ground, own, session, calibration, settings, parameters, waypoint, config.version)
-        router = MessageRouter(ground, types.by_type, parameters, commands, own)
-        self._incoming = Incoming(ground, router, parameters, session.send_mavlink, *ids, emit)
+        self._incoming = Incoming(ground, types.by_type, parameters, commands, own, session.send_mavlink, *ids, emit)
         #: Served in this order, after the line itself.
         self._parts: list[TimedPart] = [runner, sharing, *types.uploads, self._watch, settings]
         self._parts += [parameters, ground, readiness, calibration, own, self._reporter]

@@ -113,12 +113,6 @@ class Budget:
         own.spend(-1.0)
         return False
 
-    def give_back(self, cost: Cost, *, is_proven: bool = False) -> None:
-        """Take back work that was allowed, but not done."""
-        self._own[cost].spend(-1.0)
-        if not is_proven:
-            self._totals[cost].spend(-1.0)
-
 
 class Budgets:
     """The budgets of all addresses, and their totals."""

@@ -17,8 +17,6 @@ from protocols.mavlink.frame import MavlinkFrame
 
 #: A UDP station that is silent for this long has left; a TCP station leaves with the connection.
 EXPIRY_S = 60.0
-#: This time applies to a station whose ids have all moved to another address, as after Wi-Fi roaming.
-MOVED_S = 5.0
 #: This time applies to a station that has not shown that it receives anything.
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
@@ -124,16 +122,10 @@ class Ground:
         self._has_changed()
 
     def tick(self, now: float) -> None:
-        latest: dict[tuple[str, tuple[int, int]], float] = {}
-        for peer, station in self._heard.items():
-            for ids, sender in station.senders.items():
-                latest[peer.link, ids] = max(sender.heard_at, latest.get((peer.link, ids), -inf))
-        for peer, station in [*self._heard.items()]:
+        for station in [*self._heard.values()]:
             if now >= station.bad_news.due:
                 station.say_again(now)
-            # Heard later at another address: the station has moved there.
-            moved = all(latest[peer.link, ids] > each.heard_at for ids, each in station.senders.items())
-            if now >= station.heard_at + (MOVED_S if moved else EXPIRY_S):
+            if now >= station.heard_at + EXPIRY_S:
                 self._leaves(station)
         for peer, station in [*self._unproven.items()]:
             if now >= station.heard_at + _UNPROVEN_S:

@@ -146,22 +146,6 @@ class Sender:
     frame was delayed. A sender without numbers seems to lose a frame each time.
     """
 
-    __slots__ = (
-        "__weakref__",
-        "_missing",
-        "_newest",
-        "compid",
-        "frames",
-        "heard_at",
-        "is_copy",
-        "is_late",
-        "last_lost",
-        "number",
-        "station",
-        "sysid",
-        "transfers",
-    )
-
     def __init__(self, station: "GroundStation", sysid: int, compid: int) -> None:
         self.station, self.sysid, self.compid = station, sysid, compid
         self.heard_at = -inf
@@ -323,11 +307,6 @@ class GroundStation:
         return self.budget is None or self.budget.allows(
             cost, self.heard_at if now is None else now, is_proven=is_proven
         )
-
-    def give_back(self, cost: Cost) -> None:
-        """Take back work that was allowed, but not done."""
-        if self.budget is not None:
-            self.budget.give_back(cost, is_proven=self.standing is Standing.PROVEN)
 
     def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
         """Note a frame; returns the sender."""

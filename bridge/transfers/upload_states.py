@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Uploads: their states from MISSION_COUNT to the final MISSION_ACK, the events, and whose turn it is."""
+"""Uploads: their states from MISSION_COUNT to the final MISSION_ACK, and the events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,12 +17,6 @@ from protocols.mission_item import MissionItem, MissionResult
 #: QGroundControl reports a failed write 1.5 s after the last item, unless that is requested again; MAVSDK after 2.5 s.
 #: Writing 120 records to an INAV takes 2.4 s. Twice in that time, in case one request is lost.
 _NO_ANSWER_S = 0.6
-#: After this long with lists arriving, an upload does not wait for its turn: a slow or silent ground station would lock
-#: out the others. A pause ends that.
-_ALONE_S = 4.0
-_PAUSE_S = 3.0
-#: Nor does it if more than this many are running or waiting.
-_MOST_IN_TURN = 4
 
 
 class Event:
@@ -266,42 +260,3 @@ _ROWS: Mapping[type[UploadState], _Row] = {
 # fmt: on
 #: State -> event -> next state. A clear asks for nothing first: it waits, and is complete.
 TRANSITIONS = {state: dict(zip(_EVENTS, row, strict=True)) for state, row in _ROWS.items()}
-
-
-class UploadQueue:
-    """The uploads in the order of their MISSION_COUNT."""
-
-    def __init__(self) -> None:
-        self.uploads: list[Upload] = []
-        #: When lists began to arrive without a pause, and when the last upload ended.
-        self._arriving_since = self._last_end = -inf
-
-    def within(self, *states: type[UploadState]) -> list[Upload]:
-        return [upload for upload in self.uploads if isinstance(upload.state, states)]
-
-    def undelivered(self) -> list[Upload]:
-        return [upload for upload in self.uploads if not isinstance(upload.state, Delivering)]
-
-    def least_worth(self) -> Upload:
-        """The upload to end if too many run: one without items, the oldest."""
-        return min(self.undelivered(), key=lambda upload: (bool(upload.state.received), upload.state.deadline))
-
-    def remove(self, upload: Upload, now: float) -> None:
-        self._last_end = now
-        self.uploads.remove(upload)
-
-    def due(self, now: float) -> float:
-        """When an upload's state is due, or a waiting one may continue although others are arriving."""
-        turn = self._arriving_since + _ALONE_S
-        times = [upload.state.due for upload in self.uploads]
-        return min([*times, turn] if now < turn and self.within(Waiting) else times, default=inf)
-
-    def begins_to_arrive(self, upload: Upload, now: float) -> None:
-        """An upload's turn has come."""
-        if self.within(Asking, Receiving) == [upload] and now >= self._last_end + _PAUSE_S:
-            self._arriving_since = now
-
-    def must_wait(self, now: float) -> bool:
-        """True while the list of another upload is arriving as it should."""
-        is_early = now < self._arriving_since + _ALONE_S and len(self.uploads) <= _MOST_IN_TURN
-        return is_early and bool(self.within(Asking, Receiving, Complete))

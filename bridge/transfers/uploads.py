@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Uploads run one at a time, in the order of their MISSION_COUNT. If slow or numerous lists would lock out the others,
-they are received in parallel and written one at a time. Mission Planner loses some packets, and takes any ack to
+Lists are received in parallel, and written one at a time. Mission Planner loses some packets, and takes any ack to
 MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
@@ -43,7 +42,7 @@ from bridge.transfers.upload_states import (
     SenderFinished,
     Turn,
     Upload,
-    UploadQueue,
+    UploadState,
     Waiting,
 )
 from bridge.voice import sentences
@@ -57,8 +56,6 @@ from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _EMPTY_PLAN = Refusal(MissionResult.DENIED, sentences.EMPTY_PLAN())
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
-#: The maximum number of simultaneous uploads.
-_MOST_UPLOADS = 256
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
 _AGAIN = Replaced("the station started again")
@@ -78,7 +75,8 @@ class MissionUploads:
         self._ground = ground
         self._emit = emit
         self._incidents = incidents
-        self._queue = UploadQueue()
+        #: In the order of their MISSION_COUNT.
+        self._uploads: list[Upload] = []
         self.answers = UploadAnswers(ground, missions.mission_type)
         #: The time of the next `tick`, or infinity if there is no upload, and no answer to repeat.
         self.due = inf
@@ -86,7 +84,7 @@ class MissionUploads:
 
     @property
     def receiving(self) -> MissionTransfer | None:
-        for upload in self._queue.within(Receiving):
+        for upload in self._within(Receiving):
             received = len(upload.state.received)
             return MissionTransfer(str(upload.sender), TransferStep.RECEIVING, received, upload.count)
         return None
@@ -136,7 +134,7 @@ class MissionUploads:
     def item(self, sender: Sender, item: MissionItem, now: float) -> None:
         upload = self._of(sender)
         if upload is None:
-            self.answers.late_item(sender, item.seq, now, is_lost=not self._queue.uploads)
+            self.answers.late_item(sender, item.seq, now, is_lost=not self._uploads)
             return
         if sender.is_late and sender.is_older(upload.number):
             # Delayed by the network: an item of the previous list.
@@ -175,7 +173,7 @@ class MissionUploads:
 
     def reads(self, sender: Sender, now: float) -> None:
         """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
-        for upload in [*self._queue.uploads]:
+        for upload in [*self._uploads]:
             if upload.sender == sender and now >= upload.heard_at + _SILENT_S:
                 self._handle(upload, Replaced("the station reads the mission"), now)
 
@@ -183,37 +181,40 @@ class MissionUploads:
 
     def end(self, refusal: Refusal, now: float) -> None:
         """End the uploads not yet delivered: the craft was armed, the flight controller lost, or the bridge stops."""
-        for upload in self._queue.undelivered():
+        for upload in self._within(Waiting, Asking, Receiving, Complete):
             self._handle(upload, Ended(refusal), now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: the uploads end without waiting for the timeout."""
-        for upload in self._queue.undelivered():
+        for upload in self._within(Waiting, Asking, Receiving, Complete):
             if upload.sender.peer == peer:
                 self._handle(upload, Ended(_cancelled(sentences.DISCONNECTED())), now)
 
     def tick(self, now: float) -> None:
         """Repeat requests and answers, end states at their deadlines, continue the uploads whose turn has come."""
         self.due = inf
-        for upload in [*self._queue.uploads]:
+        for upload in [*self._uploads]:
             state = upload.state
             if now >= state.deadline:
                 self._handle(upload, Ended(state.timeout), now)
             elif now >= state.due:
-                if state.received:
+                if state.received or isinstance(state, Delivering):
                     # Without items, a station there may have started again, and would take it for its own list's.
                     self._follow(upload, now)
                 self._request(upload, *state.repeats(now))
         self.answers.tick(now)
-        for upload in self._queue.within(Waiting, Complete):
+        for upload in self._within(Waiting, Complete):
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
-        self.due = min(self.due, self._queue.due(now), self.answers.due)
+        self.due = min(self.due, self.answers.due, *(upload.state.due for upload in self._uploads))
+
+    def _within(self, *states: type[UploadState]) -> list[Upload]:
+        return [upload for upload in self._uploads if isinstance(upload.state, states)]
 
     def _wake(self) -> None:
         """A transfer has ended: perhaps an upload may continue at once."""
-        if self._queue.within(Waiting, Complete):
+        if self._within(Waiting, Complete):
             self.due = 0.0
 
     # State changes of an upload.
@@ -228,14 +229,11 @@ class MissionUploads:
             return
         number = sender.number
         upload = Upload(sender, count, f"upload-{next(self._incidents)}", mission_type, now, number)
-        self._queue.uploads.append(upload)
+        self._uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
         if armed is not None:
             self._handle(upload, Ended(armed), now)
-        elif len(self._queue.uploads) > _MOST_UPLOADS:
-            ended = self._queue.least_worth()
-            self._handle(ended, Ended(_cancelled(sentences.TOO_MANY_AT_ONCE())), now)
 
     def _turn(self, upload: Upload, now: float) -> Event | None:
         """The event that continues an upload, None if it must wait for others."""
@@ -246,7 +244,7 @@ class MissionUploads:
             if refusal is None and is_write and not upload.sender.station.allows(Cost.FLASH):
                 refusal = Refusal(MissionResult.DENIED, sentences.FLASH_WEAR())
         else:
-            refusal = OCCUPIED if self._queue.must_wait(now) else self._missions.occupied()
+            refusal = self._missions.occupied()
         if refusal is not None:
             return None if refusal is OCCUPIED else Ended(refusal)
         is_clear = isinstance(state, Waiting) and not upload.count
@@ -254,7 +252,7 @@ class MissionUploads:
 
     def _handle(self, upload: Upload, event: Event, now: float) -> None:
         """Change the state of an upload, unless it has ended meanwhile."""
-        if upload not in self._queue.uploads:
+        if upload not in self._uploads:
             return
         before = upload.state
         after = TRANSITIONS[type(before)][type(event)]
@@ -263,7 +261,7 @@ class MissionUploads:
             upload.state = after(upload, event, now)
             self.due = 0.0 if after is Complete else min(self.due, upload.state.due)
         elif after is Fixed.END:
-            self._queue.remove(upload, now)
+            self._uploads.remove(upload)
             self._missions.release(upload)
         match event:
             case Turn() if isinstance(before, Complete):
@@ -272,8 +270,7 @@ class MissionUploads:
                 delivered = partial(self._delivered, upload, before.whole.verdict)
                 self._missions.run(self._delivery(upload, before.whole), delivered, now)
             case Turn():
-                self._queue.begins_to_arrive(upload, now)
-                if self._queue.within(Asking) == [upload]:
+                if self._within(Asking) == [upload]:
                     # The reply serves all that wait for it.
                     self._missions.run(self._missions.preflight(), self._asked, now)
             case Ready():
@@ -289,7 +286,7 @@ class MissionUploads:
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         """The flight controller has answered whether it can take a list."""
-        for upload in self._queue.within(Asking):
+        for upload in self._within(Asking):
             event: Event
             if isinstance(answer, Refusal):
                 event = Ended(answer)
@@ -322,13 +319,11 @@ class MissionUploads:
             self._handle(upload, Ended(delivery), now)
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
-        if verdict.result is not Result.REJECTED and accepted and not delivery.change:
-            upload.sender.station.give_back(Cost.FLASH)
         shown = with_meant_home(verdict) if upload.is_write_fast else verdict
         if accepted and upload.is_part:
             upload.sender.say(sentences.PART_OF_LAST())
         self.answers.report(upload.sender, shown, delivery)
-        if upload in self._queue.uploads:
+        if upload in self._uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
         self._emit(
@@ -355,9 +350,11 @@ class MissionUploads:
 
     def _of(self, sender: Sender) -> Upload | None:
         """The newest upload of a ground station: one may wait behind another that is being written."""
-        for upload in reversed(self._queue.uploads):
-            if (upload.sender.sysid, upload.sender.compid) == (sender.sysid, sender.compid):
-                self._follow(upload, sender.station.heard_at)
+        for upload in reversed(self._uploads):
+            if upload.sender == sender:
+                return upload
+        for upload in self._uploads:
+            self._follow(upload, sender.station.heard_at)
             if upload.sender == sender:
                 return upload
         return None
@@ -375,7 +372,6 @@ class MissionUploads:
         state = upload.state
         if isinstance(state, DeliveringUnanswered):
             return
-        self._follow(upload, now)
         is_cancelled, is_repeated = isinstance(state, DeliveringDespiteCancel), isinstance(state, Delivering)
         to, count, kind = upload.sender, upload.count, upload.mission_type
         self.answers.end(to, ack, count, now, kind, is_cancelled=is_cancelled, is_repeated=is_repeated)

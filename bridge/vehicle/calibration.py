@@ -93,10 +93,6 @@ class ActionResult(Enum):
     REFUSED = "not supported", CommandResult.UNSUPPORTED
 
 
-#: Without an answer it may be done.
-_NOT_DONE = frozenset(ActionResult) - {ActionResult.DONE, ActionResult.FREEZES, ActionResult.NO_ANSWER}
-
-
 @dataclass(eq=False)
 class Calibration:
     """The calibration in progress, at most one at a time."""
@@ -161,8 +157,6 @@ class Calibration:
     def _asked(self, sender: Sender, command: int, action: FcAction, outcome: ActionResult, now: float) -> None:
         """The flight controller has begun, or the reason why it has not is known."""
         result = outcome.ack
-        if outcome in _NOT_DONE:
-            sender.station.give_back(Cost.FLASH)
         if result is not CommandResult.ACCEPTED:
             self._refuse(sender, command, action, outcome)
             return

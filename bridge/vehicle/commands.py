@@ -223,8 +223,6 @@ class CommandService:
             sender.say(sentences.SETTINGS_SAVED())
             self._acknowledge(sender, command, CommandResult.ACCEPTED)
             return
-        if result.cause is not Cause.NO_ANSWER:
-            sender.station.give_back(Cost.FLASH)
         # Mission Planner sends it by itself.
         sender.say(result.why, is_routine=True)
         self._acknowledge(sender, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))

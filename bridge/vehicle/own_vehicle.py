@@ -35,8 +35,6 @@ from reports.verdict import SentSeqs
 
 #: The interval of HEARTBEAT, and the clock for messages without a reading.
 _TICK_S = 1.0
-#: The minimum interval between updates of the polls: each costs a step for every message and ground station.
-_POLLS_INTERVAL_S = 0.25
 #: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
 #: Without a reading for this long nothing is known: SYS_STATUS is sent anyway, and no item is shown as flown to.
@@ -48,7 +46,6 @@ _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
-_HOME = (make.home_position, make.gps_global_origin)
 _POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
 #: A message, and the reading that triggers it, or None if the clock.
 _Trigger = tuple[Row, type[Reading] | None]
@@ -86,7 +83,6 @@ class OwnVehicle:
         #: The intervals of the messages and readings that `_rows` and the polls follow.
         self._requested_rates: tuple[Mapping[int, float], Mapping[type[Reading], float]] = {}, {}
         self._newcomers_due = inf
-        self._polls_set_at, self._polls_due = -inf, inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
         #: The ground stations whose waypoint was set since the last report of the board.
@@ -108,24 +104,19 @@ class OwnVehicle:
         self._newcomers_due = min(self._newcomers_due, now + _NEWCOMER_INTERVAL_S)
         self.due = min(self.due, self._newcomers_due)
         self._beat(now, [station])
-        self._follow_requests()
 
     def tick(self, now: float) -> None:
         if now >= self._newcomers_due:
             self._greet(now)
         if now >= self._second_ends:
             self._end_second(now)
-        if now >= self._polls_due:
-            self._set_polls(self._ground.everyone)
-            self._polls_set_at = now
-        self.due = min(self._second_ends, self._newcomers_due, self._polls_due)
+        self.due = min(self._second_ends, self._newcomers_due)
 
     def _end_second(self, now: float) -> None:
         # Polls are also due at whole seconds: one wake-up serves both.
         self._second_ends = floor(now) + _TICK_S
         everyone = self._ground.everyone
         self._set_polls(everyone)
-        self._polls_set_at = now
         self.readiness.follow(now)
         self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
@@ -138,12 +129,13 @@ class OwnVehicle:
     def _greet(self, now: float) -> None:
         newcomers = [station for station in self._ground.everyone if now < station.greeted_until]
         self._newcomers_due = now + _NEWCOMER_INTERVAL_S if newcomers else inf
+        self._set_polls(self._ground.everyone)
         self._beat(now, newcomers)
 
     def _inform_newcomers(self, everyone: Sequence[GroundStation], now: float) -> None:
         """Tell home and the reasons not to arm."""
         newcomers = [station for station in everyone if not station.is_informed]
-        for message in self._moment(now).made(*_HOME) if newcomers else ():
+        for message in self._moment(now).made(make.home_position) if newcomers else ():
             self._ground.outbox.multicast(pack(message), newcomers)
         for station in newcomers:
             station.is_informed = True
@@ -216,8 +208,8 @@ class OwnVehicle:
         """Set the interval of a message for one ground station. Returns None if the default. False: no such message."""
         if msgid not in _ROWS:
             return False
+        # The polls follow later: that costs a step for every message and ground station.
         station.rates.request(msgid, None if interval_s is None else max(interval_s, _FASTEST_S))
-        self._follow_requests()
         return True
 
     def refuse_current(self, sender: Sender, now: float) -> None:
@@ -246,14 +238,8 @@ class OwnVehicle:
             if row.stream == stream or (stream == _ALL_STREAMS and row.stream != NO_STREAM):
                 self.set_interval(station, row.msgid, interval_s)
 
-    def _follow_requests(self) -> None:
-        """Update the polls soon, but not too often."""
-        self._polls_due = self._polls_set_at + _POLLS_INTERVAL_S
-        self.due = min(self.due, self._polls_due)
-
     def _set_polls(self, everyone: Sequence[GroundStation]) -> None:
         """Set each poll to the highest rate requested."""
-        self._polls_due = inf
         polls = self._session.polls
         requested_rates = fastest_s(everyone, _DEFAULTS_S), self._also_wanted
         if requested_rates != self._requested_rates:
@@ -401,7 +387,7 @@ class OwnVehicle:
         home = self._session.vehicle.home
         if home == self._announced_home:
             return
-        for message in self._moment(now).made(*_HOME):
+        for message in self._moment(now).made(make.home_position):
             self._announced_home = home
             self._ground.broadcast(message)
 

@@ -50,7 +50,6 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, v.Power, 0.5, EXTRA3, make.battery_status),
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS, v.Sticks, 0.5, RC_CHANNELS, make.rc_channels),
     Row(m.MAVLINK_MSG_ID_HOME_POSITION, v.GlobalPosition, inf, NO_STREAM, make.home_position),
-    Row(m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, None, inf, NO_STREAM, make.gps_global_origin),
     Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, v.Motors, 0.5, RC_CHANNELS, make.servo_output_raw),
     Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, v.Pressure, 0.5, RAW_SENSORS, make.scaled_pressure),
     Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, make.attitude_quaternion),

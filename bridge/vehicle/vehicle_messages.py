@@ -531,13 +531,6 @@ def home_position(at: Moment) -> Message:
     return messages.MAVLink_home_position_message(*place, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach)
 
 
-def gps_global_origin(at: Moment) -> Message:
-    """GPS_GLOBAL_ORIGIN: where the local frame begins, at home."""
-    home = known(at.vehicle.home)
-    altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
-    return messages.MAVLink_gps_global_origin_message(home.lat_e7, home.lon_e7, altitude_mm, at.boot_ms * 1000)
-
-
 def _rssi(at: Moment) -> int:
     """0..254, or 255: unknown."""
     signal = at.fresh(v.Signal)

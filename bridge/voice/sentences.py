@@ -153,7 +153,6 @@ MESSAGES_LOST = Sentence(_ERROR, "Mission NOT written: messages lost, use Write"
 CANCELLED = Sentence(_ERROR, "Upload cancelled, old mission kept")
 CANCELLED_WITH = Sentence(_ERROR, "Upload cancelled (result {}), old mission kept", 255)
 DISCONNECTED = Sentence(_ERROR, "Upload ended: disconnected, old mission kept")
-TOO_MANY_AT_ONCE = Sentence(_ERROR, "Upload ended: too many at once")
 BRIDGE_STOPS = Sentence(_ERROR, "Upload ended: naze-bridge stops, old mission kept", lasts=True)
 LOST_DURING_UPLOAD = Sentence(_ERROR, "Flight controller lost during the upload", lasts=True)
 STILL_WRITING = Sentence(_ERROR, "Still writing the mission: wait for the result", lasts=True)

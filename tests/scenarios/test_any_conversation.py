@@ -155,7 +155,7 @@ class Conversation(RuleBasedStateMachine):
         world.run(10)
         self.the_board_holds_a_list_that_was_sent()
         assert isinstance(world.inside.session.state, Polling)
-        assert not world.inside.uploads._queue.uploads
+        assert not world.inside.uploads._uploads
         assert not world.bridge.is_busy
         items = waypoints(LONGEST + 5, 900)
         for station in self.stations:

@@ -94,7 +94,7 @@ def test_every_conversation_ends_with_any_replies(seed: int) -> None:
     Download(station).run(60)
     station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0, 9))
     world.wait_until(lambda w: not w.bridge.is_busy, 60)
-    assert not world.inside.uploads._queue.uploads
+    assert not world.inside.uploads._uploads
 
 
 @pytest.mark.parametrize(

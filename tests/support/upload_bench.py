@@ -27,7 +27,7 @@ def holding(options: SimOptions | None = None, faults: Faults | None = None) -> 
 
 def state(world: World) -> type[UploadState] | None:
     """The state of the first upload; None if there is none."""
-    uploads = list(world.inside.uploads._queue.uploads)
+    uploads = list(world.inside.uploads._uploads)
     return type(uploads[0].state) if uploads else None
 
 

@@ -17,7 +17,7 @@ m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ATTITUDE, GPS_RAW_INT, RAW_IMU = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_RAW_IMU
 #: Sent without a request for messages.
-_UNASKED = {"HEARTBEAT", "HOME_POSITION", "GPS_GLOBAL_ORIGIN"}
+_UNASKED = {"HEARTBEAT", "HOME_POSITION"}
 #: Mission Planner's requests (stream, rate), sent twice at the first heartbeat.
 MISSION_PLANNER = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
 
