@@ -144,6 +144,7 @@ class Incoming:
             m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: s.to(m.MAVLink_log_entry_message(0, 0, 0, 0, 0)),
             m.MAVLINK_MSG_ID_PING: self._ping,
             m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
+            m.MAVLINK_MSG_ID_SYSTEM_TIME: lambda _s, msg, now: vehicle.hear_station_time(msg.time_unix_usec / 1e6, now),
         }
 
     def received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:

@@ -31,7 +31,7 @@ CEILINGS = {
     "attitude": Walk(calls=40, returns=12, files=18),
     "item": Walk(calls=57, returns=23, files=16),
     "ack": Walk(calls=413, returns=213, files=43),
-    "setting": Walk(calls=265, returns=108, files=51),
+    "setting": Walk(calls=263, returns=108, files=47),
     "arming": Walk(calls=66, returns=18, files=26),
 }
 #: A walk may be this much shorter than its ceiling.
