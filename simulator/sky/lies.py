@@ -20,6 +20,8 @@ class Lies:
     gps_lag: float = 0.2
     #: The barometer's height rises by this, m/s.
     baro_drift: float = 0.0
+    #: The barometer's height on the ground is this much too low in a hover, m: the propellers press the air.
+    prop_wash: float = 0.0
     #: A factor of the propellers' vibration.
     vibration: float = 1.0
     #: A factor of the front right motor's thrust.

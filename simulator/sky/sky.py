@@ -4,7 +4,7 @@
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from math import pi, sin
+from math import exp, pi, sin
 
 from simulator.sky.battery import Battery
 from simulator.sky.body import GRAVITY, Airframe, Body
@@ -21,6 +21,8 @@ _FILTER = 1 - 1 / (1 + 2 * pi * 44.0 * _STEP_S)
 _ACCELERATION_NOISE, _RATE_NOISE, _FIELD_NOISE, _PRESSURE_NOISE = 0.08, 0.002, 0.002, 1.2
 #: The amplitude of the propellers' vibration in a hover that passes the filter, m/s2, and its frequency as sampled.
 _VIBRATION, _VIBRATION_HZ = 0.4, 83.0
+#: The propellers' pressure on the barometer falls with the height, m.
+_WASH_HEIGHT = 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,8 +144,6 @@ class Sky:
     def pressure(self) -> float:
         """Pa."""
         drift = self._pressure_drift.step(0.01)
-        return (
-            self.place.pressure(self.body.position[2] + self._baro_error)
-            + drift
-            + self._noise.gauss(0, _PRESSURE_NOISE)
-        )
+        height = self.body.position[2]
+        wash = self.lies.prop_wash * self._hovers * exp(-height / _WASH_HEIGHT)
+        return self.place.pressure(height - wash + self._baro_error) + drift + self._noise.gauss(0, _PRESSURE_NOISE)

@@ -65,6 +65,17 @@ def test_a_drifting_barometer_rises_on_the_ground() -> None:
     assert before - fmean(sky.pressure() for _ in range(300)) == pytest.approx(113, abs=5)
 
 
+def test_propellers_press_the_air_on_the_ground() -> None:
+    sky = still()
+    before = fmean(sky.pressure() for _ in range(200))
+    sky.lies.prop_wash = 1.0
+    sky.body.thrusts = [GRAVITY / 4] * 4
+    # 12 Pa are a metre.
+    assert fmean(sky.pressure() for _ in range(200)) == pytest.approx(before + 12, abs=2)
+    sky.body.position = (0.0, 0.0, 4.0)
+    assert fmean(sky.pressure() for _ in range(200)) == pytest.approx(before - 48, abs=3)
+
+
 def test_pressure_falls_with_height() -> None:
     sky = still()
     low = fmean(sky.pressure() for _ in range(300))
