@@ -69,7 +69,7 @@ def test_an_upload_interrupted_by_a_power_cut_is_settled(program: RealProgram, f
     assert happens(lambda: daemon.missions()[0]["outcome"] == "FAILED", _TIMEOUT_S), daemon.printed
     last_word = daemon.missions()[0]["detail"]
     figure(f"the daemon, power cut in mid upload: '{last_word}'", f"after {time.monotonic() - began:.1f} s")
-    assert last_word == "Mission did not arrive: write it again"
+    assert last_word == "No answer, old mission kept: write it again"
     assert program.stats["records"] == records_of(judge(_OLD))
     program.wait_ready()
     daemon.push(_NEW)

@@ -33,6 +33,8 @@ PLACE = Place()
 _CORE, _PROGRESS = "flight", struct.Struct("<BBHH")
 _NONE = 0xFFFF
 _LATE_S = 1.0
+#: EXTENDED_SYS_STATE is sent once a second, and the board's report before it may be half a second old.
+_STATE_LATE_S = 1.5
 _STEP_S = 0.02
 _FLIGHT_S = 240.0
 #: The board's own judgement of a place, by its GPS, is this much off the truth at most.
@@ -197,6 +199,7 @@ def test_a_flown_mission_is_seen_as_it_is(image: Image, figure: Figure, tele_pro
     assert (current.seq, current.mission_state) == (6, m.MISSION_STATE_COMPLETE)
     assert flight.station.texts().count("Mission flown") == 1
     assert max(off.values()) < _OFF_M
+    assert max(late.pop(name) for name in ("landed state", "landing")) <= _STATE_LATE_S
     assert max(late.values()) <= _LATE_S, late
 
 

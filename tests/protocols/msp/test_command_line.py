@@ -47,3 +47,12 @@ def test_another_boards_reply_is_not_an_echo() -> None:
     watch.sent.extend((IDENT, IDENT, IDENT))
     watch.feed(b"$M>\x07d\xf0\x03\0\0\0\0\0\x94" * 4)
     assert not watch.is_echo()
+
+
+def test_a_header_echoed_behind_the_prompt_is_a_command_line() -> None:
+    """Of FLIGHT, command 179, only the header comes back."""
+    watch = EchoWatch()
+    watch.feed(b"wpflush\t clear wp list\r\n\r\n# ")
+    assert not watch.is_echo()
+    watch.feed(b"$M<ee$M<")
+    assert watch.is_echo()
