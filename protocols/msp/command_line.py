@@ -55,10 +55,8 @@ class EchoWatch:
         self._heard = (self._heard + data)[-_HEARD_KEPT:]
 
     def is_echo(self, size: int = _EVIDENCE) -> bool:
-        """True if the last `size` bytes are our own requests, with a header: a reply may quote a request's text.
-
-        Behind Harakiri's prompt the header is enough.
-        """
+        """True if the last `size` bytes are our own requests, with a header, or a header follows Harakiri's prompt."""
+        # A reply may quote a request's text.
         tail = self._heard[-size:]
         is_sent = len(tail) == size and _HEADER in tail and tail in _printable(b"".join(self.sent))
         return is_sent or PROMPT + _HEADER in self._heard
