@@ -97,7 +97,7 @@ class Bridge:
 
     def __init__(self, config: BridgeConfig, now: float) -> None:
         self._config = config
-        #: To be carried out, in order; `take` adds the datagrams and the bytes for the board.
+        #: To be carried out, in order. `take` adds the datagrams and the bytes for the board.
         self._effects: list[BridgeEffect] = []
         #: The line's state, speed or polls may have changed since the last `take`. A conversation that starts has
         #: output, or waits for a reply or timeout that the line already expects.
@@ -207,7 +207,7 @@ class Bridge:
         self._session.opened(now)
 
     def fc_closed(self, now: float, why: str | None) -> None:
-        """The port was lost; `why` is None if the bridge closed it itself."""
+        """The port was lost. `why` is None if the bridge closed it itself."""
         self._has_line_changed = True
         self._session.closed(now, why)
 
@@ -280,7 +280,7 @@ class Bridge:
         self._runner.store_answered(effect, answer, now)
 
     def stop_missions(self, now: float) -> None:
-        """Accept no more transfers. An upload that still receives items ends; a running push continues."""
+        """Accept no more transfers. An upload that still receives items ends. A running push continues."""
         self._types.close()
         self._sharing.stop()
         self._types.end_uploads(STOPPED, now)

@@ -51,7 +51,7 @@ class BridgeConfig:
     """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: access rules by link name; every station may write over other links. `is_near`: True for an IP address on
+    `links`: access rules by link name. Every station may write over other links. `is_near`: True for an IP address on
     this machine's own networks, without a router in between. `has_log`: there is a telemetry log. `flight`: of the
     craft that a previous bridge left armed. `seals`: of the settings of the boards seen before.
     """

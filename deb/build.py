@@ -4,7 +4,7 @@
 naze-bridge-sim has the simulators, which a pilot's Pi does not need.
 
 The libraries are the wheels that requirements.lock pins, for the Pythons of Debian 12 and 13 and Ubuntu 24.04 side by
-side; pip fetches them for any architecture on any machine, and nothing is compiled. The target does not need a network.
+side. pip fetches them for any architecture on any machine, and nothing is compiled. The target does not need a network.
 
 cbor2 has no wheel for armhf: the last pure Python release is used there (armhf.lock). pymavlink has none either.
 Only the modules that we use are packed: the rest is a module in C and 90 MB of other dialects and log tools.
@@ -43,7 +43,7 @@ _GLIBC = (*(f"manylinux_2_{minor}" for minor in range(36, 16, -1)), "manylinux20
 
 
 def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _DIST, compression: str = "xz") -> Path:
-    """Build naze-bridge, and naze-bridge-sim next to it, in `folder`; returns the path of the first.
+    """Build naze-bridge, and naze-bridge-sim next to it, in `folder`. Returns the path of the first.
 
     `compression` is dpkg-deb's.
     """
@@ -56,7 +56,7 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
     for python in pythons:
         fetch(architecture, python, wheels)
         target = _target(python, _MACHINES[architecture])
-        # Only from the wheels, whose hashes were just checked; build tools are left out.
+        # Only from the wheels, whose hashes were just checked. Build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
         _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, f"naze-bridge=={version}")
@@ -88,7 +88,7 @@ def debian_version(version: str) -> str:
 
 
 def fetch(architecture: str, python: str, wheels: Path) -> None:
-    """Download the wheels for one Python to the folder `wheels`; their hashes are checked.
+    """Download the wheels for one Python to the folder `wheels`. Their hashes are checked.
 
     Wheels for every Python and machine that are already there stay.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Signs packages with the maintainer's SSH key, so that the status page of a Pi accepts them as updates.
 
-`python -m deb.sign dist/*.deb` signs packages of `make deb` with git's user.signingkey; `make release` does it itself.
+`python -m deb.sign dist/*.deb` signs packages of `make deb` with git's user.signingkey. `make release` does it itself.
 """
 
 import subprocess

@@ -118,7 +118,7 @@ def _copy(source: Path, folder: Path, name: str = "") -> None:
 
 
 def _describe(root: Path, described: Path, version: str, architecture: str) -> None:
-    """Add the control files; those that are not computed are in the folder `described`."""
+    """Add the control files. Those that are not computed are in the folder `described`."""
     folder = root / "DEBIAN"
     folder.mkdir(mode=0o755)
     files = sorted(path for path in root.rglob("*") if path.is_file() and not path.is_symlink())

@@ -29,7 +29,7 @@ _TRUTH = {"true": True, "yes": True, "false": False, "no": False}
 
 
 def parse_condition(text: str) -> Condition:
-    """Read one condition; ValueError gives the reason. An unknown value satisfies only !=."""
+    """Read one condition. ValueError gives the reason. An unknown value satisfies only !=."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise ValueError(f"{text!r} is not a condition: write one like armed=true or battery_v<10.5")

@@ -36,7 +36,7 @@ _EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
 _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
 
-#: System ids of vehicles; ground stations have the others.
+#: System ids of vehicles. Ground stations have the others.
 SYSIDS = range(1, 251)
 #: NAME.json5, NAME.pem and NAME.key are the router's, or those of the certificate authority.
 _RESERVED = ("router", "ca")
@@ -221,7 +221,7 @@ def _member(data: Any) -> Member:
 
 
 def _with_sysids(members: Mapping[str, Member]) -> dict[str, Member]:
-    """Assign the lowest free system ids; beyond the last there are none. ValueError if two members have the same."""
+    """Assign the lowest free system ids. Beyond the last there are none. ValueError if two members have the same."""
     taken: dict[int, str] = {}
     for name, each in members.items():
         if each.sysid is not None and (other := taken.setdefault(each.sysid, name)) != name:

@@ -27,7 +27,7 @@ from terminal.printing import print_json
 from terminal.sentences import fail, say
 
 _TIMEOUT_S = 30.0
-#: The limit for a piece; a bridge sends 64 kB.
+#: The limit for a piece. A bridge sends 64 kB.
 _MOST_BYTES = 1 << 20
 #: After a piece without a reply, for example because the link is down.
 _TRIES, _PAUSE_S = 5, 2.0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One mission to many vehicles at once, each independent of the others.
 
-`FleetPush` keeps the progress of each vehicle; `push` feeds it from zenoh.
+`FleetPush` keeps the progress of each vehicle. `push` feeds it from zenoh.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -14,7 +14,7 @@ from fleet.session import NO_COMMANDS, NOT_UNDERSTOOD, ask_each
 from payloads.keys import ZenohKey
 from payloads.mission_data import ACCEPTED, Json
 
-#: 146 records take 2 s at 115200 baud and half a minute at 9600; a bad line may double that.
+#: 146 records take 2 s at 115200 baud and half a minute at 9600. A bad line may double that.
 _PUSH_TIMEOUT_S = 120.0
 _LOOK = "`naze-bridge fleet list` shows what it holds"
 _LOST = f"it or the router disconnected before the result was known; {_LOOK} when it is back"
@@ -116,9 +116,9 @@ def push(
     staged: bool = False,
     key: ZenohKey,
 ) -> None:
-    """Send the file to all and wait until each is done; `show` is called after every change.
+    """Send the file to all and wait until each is done. `show` is called after every change.
 
-    `staged`: one vehicle first, then each time as many as have it; after a failure no other one is started.
+    `staged`: one vehicle first, then each time as many as have it. After a failure no other one is started.
     """
     show(fleet)
     for stage in stages(fleet.waiting) if staged else [fleet.waiting]:

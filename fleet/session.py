@@ -21,7 +21,7 @@ from storage.os_error import reason
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
 #: How many vehicles get a query at the same time: each such query may carry a mission file.
 AT_ONCE = 50
-#: For peers that do not speak zenoh; zenoh's own default is 10 s.
+#: For peers that do not speak zenoh. zenoh's own default is 10 s.
 _OPEN_TIMEOUT_MS = 3000
 
 

@@ -64,7 +64,7 @@ class Watch:
         return zenoh.handlers.Callback(arrived, (lambda: arrived(None)) if has_end else None, indirect=False)
 
     def follow(self, names: Collection[str]) -> None:
-        """Subscribe to the states of these vehicles; overviews always come from all."""
+        """Subscribe to the states of these vehicles. Overviews always come from all."""
         for name in self._followed.keys() - set(names):
             self._followed.pop(name).undeclare()  # type: ignore[no-untyped-call]
         for name in set(names) - self._followed.keys():

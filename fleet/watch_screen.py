@@ -26,13 +26,13 @@ from fleet.watch import Watch
 from terminal.printing import console, print_json
 
 _REFRESH_S = 0.5
-#: The slowest profile sends the state every 30 s; one may be lost.
+#: The slowest profile sends the state every 30 s. One may be lost.
 SILENT_S = 70.0
 #: Lines without a vehicle: counts, column titles and rule, the last line, and an empty one.
 _OTHER_LINES = 5
 _LINKED = ("MSP", "MAVLink")
 _UNHEARD = "not heard yet"
-#: Rows that a key scrolls; pages are scrolled by `page` rows.
+#: Rows that a key scrolls. Pages are scrolled by `page` rows.
 _ROWS = {b"j": 1, b"\x1b[B": 1, b"k": -1, b"\x1b[A": -1}
 _PAGES = {b" ": 1, b"\x1b[6~": 1, b"b": -1, b"\x1b[5~": -1}
 

@@ -70,7 +70,7 @@ def _heading(suffix: str) -> str:
 
 
 def _fields(fields: Json) -> Iterator[str]:
-    """A line for each field; neighbours with the same type and meaning share it."""
+    """A line for each field. Neighbours with the same type and meaning share it."""
     for (kind, meaning), names in groupby(
         fields, lambda name: (_type(name, fields[name]), fields[name].get("description", ""))
     ):

@@ -37,7 +37,7 @@ class QueryKind(Enum):
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix, or None if the payload is raw MAVLink.
 
-    `kept`: the number of samples kept for subscribers that lost some; 0: none.
+    `kept`: the number of samples kept for subscribers that lost some, or 0 if there is none.
     """
 
     suffix: str

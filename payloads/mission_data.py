@@ -77,7 +77,7 @@ def printable(value: Any) -> Any:
 
 
 def mission_items(data: object) -> list[MissionItem]:
-    """Read the items of a list from plain data; ValueError gives the reason."""
+    """Read the items of a list from plain data. ValueError gives the reason."""
     if not isinstance(data, list):
         raise ValueError("items must be a list")
     return [_item(entry) for entry in data]
@@ -108,7 +108,7 @@ def correction_texts(findings: Iterable[Finding]) -> list[str]:
 
 
 def verdict_data(verdict: Verdict[Any]) -> Json:
-    """The rules' verdict on a list; `count` and `checksum` identify the records that it becomes."""
+    """The rules' verdict on a list. `count` and `checksum` identify the records that it becomes."""
     identity = identify(verdict.records)
     return {
         "result": verdict.result.name,

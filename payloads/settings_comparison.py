@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from protocols.param_file import MOST_SETTINGS, is_equal, is_setting_name
 
-#: By name; a text where the setting is one.
+#: By name. A text where the setting is one.
 SettingValues = Mapping[str, float | str]
-#: More than any setting; single precision ends here.
+#: More than any setting. Single precision ends here.
 _MOST = 3e38
 
 
@@ -29,7 +29,7 @@ def settings_difference(left: SettingValues, right: SettingValues) -> list[Setti
 
 
 def setting_values(data: object) -> SettingValues:
-    """Read a table of settings from plain data; ValueError gives the reason.
+    """Read a table of settings from plain data. ValueError gives the reason.
 
     Left out are settings that are NaN (null), and names that no setting can have.
     """

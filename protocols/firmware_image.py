@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Firmware images for a Naze32, as Intel HEX and binary files; how a Harakiri with our patch is recognised."""
+"""Firmware images for a Naze32, as Intel HEX and binary files. How a Harakiri with our patch is recognised."""
 
 import struct
 from binascii import unhexlify

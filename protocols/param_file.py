@@ -43,7 +43,7 @@ class ParamFile:
 
 
 def read_param_file(data: bytes, name: str) -> ParamFile:
-    """Read a file of settings; ParamFileError names the file `name` and the line."""
+    """Read a file of settings. ParamFileError names the file `name` and the line."""
     text = file_text(data)
     values: dict[str, float | str] = {}
     seen_at: dict[str, int] = {}
@@ -71,7 +71,7 @@ def read_param_file(data: bytes, name: str) -> ParamFile:
 
 
 def write_param_file(values: Mapping[str, float | str], board: str = "", comments: Iterable[str] = ()) -> str:
-    """The text of a Mission Planner .param file; `read_param_file` reads equal values, see is_equal.
+    """The text of a Mission Planner .param file. `read_param_file` reads equal values, see is_equal.
 
     NaN, as a board with damaged settings may have, is left out.
     """
@@ -86,7 +86,7 @@ def write_param_file(values: Mapping[str, float | str], board: str = "", comment
 
 
 def is_setting_name(name: str) -> bool:
-    """True if a file can hold a setting of this name; no firmware has another."""
+    """True if a file can hold a setting of this name. No firmware has another."""
     return _NAME.fullmatch(name) is not None
 
 

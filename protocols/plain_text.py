@@ -11,7 +11,7 @@ _LONGEST_QUOTE = 24
 
 
 def plain_text(text: str | bytes) -> PlainText:
-    """The text on one line, without control and formatting characters; letters of all languages stay.
+    """The text on one line, without control and formatting characters. Letters of all languages stay.
 
     Left out are C0 and C1 controls, marks that reverse the direction of writing, and characters without a glyph. Any
     white space becomes a space, a byte of a file name that is not UTF-8 a question mark, any other such byte U+FFFD.

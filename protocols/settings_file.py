@@ -52,7 +52,7 @@ class _Line(NamedTuple):
 
 
 def read_settings_file(data: bytes, name: str) -> SavedSettings:
-    """Read a file of settings; ParamFileError names the file `name` and the line."""
+    """Read a file of settings. ParamFileError names the file `name` and the line."""
     lines: list[_Line] = []
     safehomes: list[Safehome] = []
     unread: list[tuple[int, str]] = []

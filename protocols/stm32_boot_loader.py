@@ -43,7 +43,7 @@ class BootLoaderError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """Send `data`, after dropping unread input; wait until the reply `is_complete` or `timeout_s` has passed."""
+    """Send `data`, after dropping unread input. Wait until the reply `is_complete` or `timeout_s` has passed."""
 
     data: bytes
     timeout_s: float

@@ -64,7 +64,7 @@ class Finding:
         return self.news in (News.DANGER, News.WARNING)
 
     def text(self, count: int = 1) -> str:
-        """One line with the reason; `count` items have the same finding."""
+        """One line with the reason. `count` items have the same finding."""
         if self.seq is None:
             return _OF_THE_LIST.get(self.becomes, "") + self.why
         is_place = self.command in _PLACES
@@ -130,7 +130,7 @@ class RejectingFinding:
 def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> RejectingFinding:
     """Reject the list because of one item's field `name`."""
     was = getattr(item, name)
-    # NaN means "not given"; findings are stored as JSON, which has no NaN.
+    # NaN means "not given". Findings are stored as JSON, which has no NaN.
     return RejectingFinding(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
 
 

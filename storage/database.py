@@ -96,7 +96,7 @@ def memory_database() -> sqlite3.Connection:
 
 @contextmanager
 def transaction(connection: sqlite3.Connection, failure: str) -> Iterator[None]:
-    """A transaction; once it returns, the data is on disk. StoreError begins with `failure`."""
+    """A transaction. Once it returns, the data is on disk. StoreError begins with `failure`."""
     with explained(failure):
         connection.execute("BEGIN IMMEDIATE")
         try:
@@ -117,7 +117,7 @@ def insert(connection: sqlite3.Connection, table: str, row: Mapping[str, object]
 
 
 def row_crc32(*values: object) -> int:
-    """The checksum of a row, over the columns of SUMMARY, CONTENTS or BACKUP; damaged values may have any type."""
+    """The checksum of a row, over the columns of SUMMARY, CONTENTS or BACKUP. Damaged values may have any type."""
     return zlib.crc32(repr(values).encode(errors="backslashreplace"))
 
 
@@ -153,7 +153,7 @@ def _make_ready(connection: sqlite3.Connection) -> bool:
 
 
 def _keep_aside(path: Path, now: float) -> Path:
-    """Rename the file and its auxiliary files, and delete the oldest such files; returns the new name.
+    """Rename the file and its auxiliary files, and delete the oldest such files. Returns the new name.
 
     The main file goes last: if it went first, a power cut here would leave a log that SQLite deletes.
     """

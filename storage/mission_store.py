@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every received mission, accepted or not: as sent, as stored, and the outcome; the settings' backups with them."""
+"""Every received mission, accepted or not: as sent, as stored, and the outcome. The settings' backups with them."""
 
 import builtins
 import json
@@ -61,7 +61,7 @@ class ReceivedMission:
 
 @dataclass(frozen=True, slots=True)
 class MissionSummary:
-    """One line of a list of missions. Times are unix seconds; concluded_at is None while PENDING.
+    """One line of a list of missions. Times are unix seconds. concluded_at is None while PENDING.
 
     finding_count leaves out filled-in defaults. A line that was damaged on the disk has only its number and the
     outcome DAMAGED.
@@ -264,7 +264,7 @@ class MissionStore:
                 self._connection.execute("DELETE FROM missions WHERE number = ?", (number,))
 
     def _size(self) -> int:
-        """Bytes in use; freed pages are reused before the file grows."""
+        """Bytes in use. Freed pages are reused before the file grows."""
         pages, free, page_size = (
             self._connection.execute(f"PRAGMA {name}").fetchone()[0]
             for name in ("page_count", "freelist_count", "page_size")

@@ -5,7 +5,7 @@ import os
 
 
 def reason(error: Exception) -> str:
-    """The system's message. asyncio's errors have a longer one; getaddrinfo's have numbers below 0.
+    """The system's message. asyncio's errors have a longer one. getaddrinfo's have numbers below 0.
 
     A termios.error has only arguments, its number and the message.
     """

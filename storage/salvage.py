@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from storage.database import BACKUP, COMPANIONS, CONTENTS, SUMMARY, configured, row_crc32
 from storage.store_error import FAILURES
 
-#: A damaged table may claim any number; a store within its budget holds fewer.
+#: A damaged table may claim any number. A store within its budget holds fewer.
 _MOST = 200_000
 _MISSION = {"missions": SUMMARY, "mission_contents": f"number, {', '.join(CONTENTS)}"}
 _BACKUP = {"settings_backups": BACKUP}

@@ -15,7 +15,7 @@ from storage.store_error import StoreError, explained
 _MOST_OF_BOARD = 50
 _MOST = 300
 DAMAGED = "DAMAGED"
-#: By name; a text where the setting is one.
+#: By name. A text where the setting is one.
 SettingValues = Mapping[str, float | str]
 
 

@@ -10,7 +10,7 @@ class StoreError(Exception):
     """One sentence for the user: the failed operation, where, why, and what to do about it."""
 
 
-# By primary result code (https://sqlite.org/rescode.html); extended codes add the system call.
+# By primary result code (https://sqlite.org/rescode.html). Extended codes add the system call.
 _REASONS = {
     sqlite3.SQLITE_FULL: "the disk is full; free some space",
     sqlite3.SQLITE_IOERR: "the disk is full or failing; check df and dmesg",

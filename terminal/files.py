@@ -22,7 +22,7 @@ def shown_path(path: Path) -> str:
 
 
 def read_file(path: Path, failure: type[FileError]) -> bytes:
-    """The contents; `failure` if the file cannot be read."""
+    """The contents. `failure` if the file cannot be read."""
     try:
         return read_bounded(path, MAX_BYTES)
     except (OSError, ValueError) as error:

@@ -31,7 +31,7 @@ def mission_table(
 ) -> Table:
     """One row per item sent, with "sent->stored" for each changed value or item number, and one per inserted item.
 
-    `stored` is the list as it reads back, empty for a rejected or cleared one; `findings` name the items missing in it,
+    `stored` is the list as it reads back, empty for a rejected or cleared one. `findings` name the items missing in it,
     and are printed below the table with their reasons, except filled-in defaults. `sent_seqs`: see Verdict.
     """
     reasons = Text("".join(f"\n{text}" for text in correction_texts(findings)))

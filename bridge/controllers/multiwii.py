@@ -34,7 +34,7 @@ from protocols.msp.nav import (
 )
 from protocols.rights.msp import Firmware
 
-#: The capacity of the navigation build, in records; a board reports its own.
+#: The capacity of the navigation build, in records. A board reports its own.
 MULTIWII_CAPACITY = 178
 #: types.h: analog.amperage.
 CURRENTS_PER_A = 10

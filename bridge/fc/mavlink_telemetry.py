@@ -152,7 +152,7 @@ class MavlinkTelemetry:
         self._known: dict[bytes, int] = {}
         self._beats: set[bytes] = set()
         self._compid: int | None = None
-        #: When the autopilot counts as gone if no heartbeat of it is heard; a represented board never does.
+        #: When the autopilot counts as gone if no heartbeat of it is heard. A represented board never does.
         self._gone_at = -math.inf
 
     def take(self, frames: Sequence[bytes], kinds: Sequence[bytes], now: float) -> None:

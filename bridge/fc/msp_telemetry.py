@@ -25,7 +25,7 @@ from protocols.msp.telemetry import (
     decode_status,
 )
 
-#: The poll whose reply carries a reading; the others are heard in MAVLink mode only.
+#: The poll whose reply carries a reading. The others are heard in MAVLink mode only.
 POLL_FOR: Mapping[type[v.Reading], Msp] = {
     v.Orientation: Msp.ATTITUDE,
     v.GpsFix: Msp.RAW_GPS,

@@ -13,7 +13,7 @@ from operator import xor
 
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 
-#: The first one is that of most flight controllers; the others are tried only if something is heard.
+#: The first one is that of most flight controllers. The others are tried only if something is heard.
 LISTENING_SPEEDS = (115200, 9600, 57600, 38400, 230400, 19200, 4800)
 #: GPS receivers and heartbeats come once a second.
 _LISTEN_S = 1.2
@@ -25,7 +25,7 @@ _SIK_SENDER = (51, 68)
 
 
 class PortListener:
-    """One port. Set it to `speed`, feed bytes and time until `is_done`; `what` is empty if it may be probed."""
+    """One port. Set it to `speed`, feed bytes and time until `is_done`. `what` is empty if it may be probed."""
 
     def __init__(self, now: float) -> None:
         self._speeds = iter(LISTENING_SPEEDS)
@@ -81,7 +81,7 @@ _LONGEST_SENTENCE = 110
 
 
 class GpsWatch:
-    """Feed bytes; `heard` names the protocol after a complete sentence or frame with a valid checksum."""
+    """Feed bytes. `heard` names the protocol after a complete sentence or frame with a valid checksum."""
 
     def __init__(self) -> None:
         self.heard = ""

@@ -142,10 +142,10 @@ def _no_places(_board: "FlightController", _vehicle: Vehicle) -> Refusal:
 class Profile:
     """One kind of flight controller, on one protocol.
 
-    name: for people and logs. family: profiles of one firmware share it; a board that switches protocol stays in it.
-    recognise: MSP only; returns the flight controller if the interview shows that it is this kind.
-    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout; the common ones
-    are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D; others say 1 for any fix.
+    name: for people and logs. family: profiles of one firmware share it. A board that switches protocol stays in it.
+    recognise: MSP only. Returns the flight controller if the interview shows that it is this kind.
+    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout. The common ones
+    are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
     currents_per_a: the unit of ANALOG's current is 1 A divided by this.
     acc_axes: index and sign of the forward, right and downward acceleration in its RAW_IMU.
     has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.

@@ -26,8 +26,8 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     than places, so that they displace no station that sends heartbeats.
     ANSWER: a message sent on request. Mission Planner requests about sixty when it connects, most of them parameters.
     LIST: a list of all parameters, several hundred messages.
-    TRANSFER: a message of a mission transfer; over a fast link there may be a thousand items a second.
-    TEXT: a STATUSTEXT that a station causes; a mission of 146 items may need one for each.
+    TRANSFER: a message of a mission transfer. Over a fast link there may be a thousand items a second.
+    TEXT: a STATUSTEXT that a station causes. A mission of 146 items may need one for each.
     UPLOAD: a list that is announced, which costs log entries.
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.

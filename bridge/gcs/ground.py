@@ -15,7 +15,7 @@ from protocols.mavlink.codec import FrameWriter, pack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkFrame
 
-#: A UDP station that is silent for this long has left; a TCP station leaves with the connection.
+#: A UDP station that is silent for this long has left. A TCP station leaves with the connection.
 EXPIRY_S = 60.0
 #: This time applies to a station that has not shown that it receives anything.
 _UNPROVEN_S = 5.0
@@ -30,7 +30,7 @@ _EXPIRY_INTERVAL_S = 1.0
 class Ground:
     """The ground stations. `on_newcomer` is called for one that is new or returns after a silence.
 
-    `access`: the rules of each link; a link without rules is `open_access`. A station that may only read gets telemetry
+    `access`: the rules of each link. A link without rules is `open_access`. A station that may only read gets telemetry
     and answers, but no texts for everyone, and is not recorded. `is_near`: True for an address on the machine's own
     networks, without a router in between. `is_recorded`: there is a telemetry log.
     """

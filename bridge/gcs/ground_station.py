@@ -152,7 +152,7 @@ class Sender:
         #: The number of the last frame, and of the newest one with the bytes.
         self.number = 0
         self._newest = 0, b""
-        #: The frames sent so far, as far as their numbers show; those that have not arrived, and the last one of them.
+        #: The frames sent so far, as far as their numbers show. Those that have not arrived, and the last one of them.
         self.frames = 0
         self._missing: list[int] = []
         self.last_lost = -1

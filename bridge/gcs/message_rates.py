@@ -22,7 +22,7 @@ _EARLY = 0.25
 class MessageRates:
     """One station's requests and schedule, by message id.
 
-    Each message uses some of the share; messages are sent while `used_until` is not more than a burst ahead.
+    Each message uses some of the share. Messages are sent while `used_until` is not more than a burst ahead.
     """
 
     __slots__ = "due", "requested", "used_until"
@@ -61,7 +61,7 @@ def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, floa
 
 
 def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, now: float) -> list["GroundStation"]:
-    """The stations for which the message is due now; schedules the next one for each."""
+    """The stations for which the message is due now. Schedules the next one for each."""
     taken, cost_s = [], len(stations) / _MOST_PER_S
     for station in stations:
         rates = station.rates

@@ -55,7 +55,7 @@ class FrameRefusal(NamedTuple):
 class LinkAccess:
     """The conditions for writing over a link. `signing`: a signature with the key. `may_write`: the right address.
 
-    None: not required. Everything the bridge sends over a link with `signing` is signed; `link_id` is the link's number
+    None: not required. Everything the bridge sends over a link with `signing` is signed. `link_id` is the link's number
     in the signature. `passes_everything`: without conditions, an autopilot that speaks MAVLink itself also gets
     commands.
     """

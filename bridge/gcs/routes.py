@@ -2,7 +2,7 @@
 """Routes frames between an autopilot that speaks MAVLink itself and its ground stations, unchanged. Sans-IO.
 
 Routing as MAVLink describes it (https://mavlink.io/en/guide/routing.html): a frame without a target goes to everyone
-except the sender; one with a target only to where that system (and component) was heard. Frames for a system that was
+except the sender. One with a target only to where that system (and component) was heard. Frames for a system that was
 not heard yet go to the autopilot.
 """
 

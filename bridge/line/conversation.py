@@ -60,7 +60,7 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Receive:
-    """Send `request`, if any; wait for the next reply to one of `commands`. Answer: the frame, or None on timeout."""
+    """Send `request`, if any. Wait for the next reply to one of `commands`. Answer: the frame, or None on timeout."""
 
     commands: frozenset[int]
     request: Send | None = None
@@ -186,7 +186,7 @@ def _stable_part(reply: MspFrame, size: int | None) -> MspFrame:
 
 
 def begin_save(mission: ArrivedMission) -> Conversation[None]:
-    """Start to store a received mission; `end_save` waits for it."""
+    """Start to store a received mission. `end_save` waits for it."""
     yield BeginSave(Save(mission))
 
 
@@ -214,6 +214,6 @@ def note_reader(identity: ListIdentity, reader: str) -> Conversation[None]:
 
 
 def find_pending() -> Conversation[Sequence[PendingMission]]:
-    """Missions whose end an earlier run of the daemon did not see; none if the store does not answer."""
+    """Missions whose end an earlier run of the daemon did not see, or none if the store does not answer."""
     pending: Sequence[PendingMission] | None = yield FindPending()
     return pending or ()

@@ -68,7 +68,7 @@ _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 #: Constant while the same board is connected: API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, IDENT,
 #: BOXNAMES, PIDNAMES, BOXIDS, UID.
 _CONSTANT = frozenset(map(request, (1, 2, 3, 4, 5, 100, 116, 117, 119, 160)))
-#: More than a board has commands; the rest are requests with an index, whose replies are current for a moment only.
+#: More than a board has commands. The rest are requests with an index, whose replies are current for a moment only.
 _MOST_REPLIES = 256
 
 
@@ -384,7 +384,7 @@ class MspLink:
         self.echo.sent.append(data)
 
     def _take(self, frames: list[MspFrame], now: float) -> list[MspFrame]:
-        """Match the replies; requests are our own, from a looped-back line."""
+        """Match the replies. Requests are our own, from a looped-back line."""
         replies: list[MspFrame] = []
         for frame in frames:
             if frame.direction is not Direction.REQUEST:

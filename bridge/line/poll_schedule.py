@@ -24,7 +24,7 @@ _LINE_SHARE = 0.6
 _BURST_S = 0.05
 #: The part of that share reserved for STATUS: arming must be noticed at any speed.
 _STATUS_SHARE = 0.25
-#: A line without a speed (TCP) has a UART somewhere behind it; this is Harakiri's default.
+#: A line without a speed (TCP) has a UART somewhere behind it. This is Harakiri's default.
 _ASSUMED_BAUD = 115200
 #: The factor for all rates during a mission transfer.
 _BESIDE_MISSIONS = 0.2
@@ -50,7 +50,7 @@ _RECOVERY = 0.005
 _WORST_QUALITY = 0.1
 #: After this many unanswered requests in a row, while others are answered, a poll backs off.
 _TOLERATED_MISSES = 4
-#: After this many error frames in a row the command is unknown to the board; one alone may be line noise.
+#: After this many error frames in a row the command is unknown to the board. One alone may be line noise.
 _REFUSALS = 2
 _MAX_DOUBLINGS = 6
 _HALVINGS = 12
@@ -83,7 +83,7 @@ POLLS = (
     Poll(Msp.COMP_GPS, request(Msp.COMP_GPS), 5, inf),
     Poll(Msp.DEBUG, request(Msp.DEBUG), 16, inf),
 )
-#: Asked where the switches must be known in flight; the longest reply is that of 15 boxes with six aux channels.
+#: Asked where the switches must be known in flight. The longest reply is that of 15 boxes with six aux channels.
 BOX_POLL = Poll(Msp.BOX, request(Msp.BOX), 60, 5.0)
 #: For boards that report their progress in a mission.
 NAV_POLL = Poll(Msp.NAV_STATUS, request(Msp.NAV_STATUS), 7, 0.5)

@@ -91,7 +91,7 @@ class Runner:
         *,
         in_background: bool = False,
     ) -> Task[T]:
-        """Queue a conversation; `on_done` gets the result, or the LinkLost that ended it, and the time."""
+        """Queue a conversation. `on_done` gets the result, or the LinkLost that ended it, and the time."""
         task = Task(conversation, on_done, in_background)
         self._queue.append(task)
         self._begin_next(now)
@@ -156,7 +156,7 @@ class Runner:
             self._run(None, now)
 
     def advance(self, answer: object, now: float) -> None:
-        """Resume the current conversation with the answer that it waits for; start the next ones when it ends."""
+        """Resume the current conversation with the answer that it waits for. Start the next ones when it ends."""
         try:
             self._run(answer, now)
         finally:

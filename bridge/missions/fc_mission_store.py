@@ -92,7 +92,7 @@ PushProgress = Callable[[int], None]
 
 
 class FcMissionStore(ABC, Generic[RecordT]):
-    """A flight controller that stores missions; by default only one, which only the bridge changes."""
+    """A flight controller that stores missions. By default only one, which only the bridge changes."""
 
     #: True if the list can be read while the craft is armed.
     reads_armed: bool = False
@@ -119,7 +119,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
 
     @abstractmethod
     def seq_of(self, records: Sequence[RecordT], number: int) -> int:
-        """The seq of the item for record `number` (as NAV_STATUS counts, from 1); 0: none."""
+        """The seq of the item for record `number` (as NAV_STATUS counts, from 1), or 0 if there is none."""
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
         """Items read earlier, brought up to date: home may move on boards that do not store it in the list."""
@@ -148,7 +148,7 @@ class FliesToItems(ABC):
 
     @abstractmethod
     def leg_of(self, records: Sequence[Any], seq: int) -> int:
-        """The number of the record that flies to item `seq`, as read back; 0: none does."""
+        """The number of the record that flies to item `seq`, as read back, or 0 if none does."""
 
     @abstractmethod
     def fly_to(self, records: Sequence[Any], number: int) -> Conversation[Refusal | None]:

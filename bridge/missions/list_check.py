@@ -25,7 +25,7 @@ _ACKS = {"lat_e7": MissionResult.INVALID_PARAM5_X, "alt_m": MissionResult.INVALI
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The whole numbers from `low` to `high`; `instead_of_zero` is stored where 0 has no meaning."""
+    """The whole numbers from `low` to `high`. `instead_of_zero` is stored where 0 has no meaning."""
 
     low: int
     high: int
@@ -199,7 +199,7 @@ class MissionRules(Protocol):
         """True if item 0 is home."""
 
     def begin(self, count: int, fallback_home: tuple[int, int] | None) -> ListCheck:
-        """Begin the check of `count` items; `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates."""
+        """Begin the check of `count` items. `fallback_home` (lat_e7, lon_e7) replaces a home without coordinates."""
 
 
 def check_count(count: int, rules: MissionRules) -> RejectingFinding | None:
@@ -248,7 +248,7 @@ def with_home(items: Sequence[MissionItem], home: tuple[int, int] | None) -> Seq
 
 
 def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding | None:
-    """Reject frames without a usable position; frame MISSION is accepted for commands that need none."""
+    """Reject frames without a usable position. Frame MISSION is accepted for commands that need none."""
     known = item.frame in (*RELATIVE_FRAMES, *SEA_LEVEL_FRAMES, *TERRAIN_FRAMES)
     if known or (item.frame == Frame.MISSION and not needs_position):
         return None

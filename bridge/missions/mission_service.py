@@ -155,7 +155,7 @@ class MissionService:
     def run(
         self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
     ) -> None:
-        """Run a conversation; `on_done` gets the result and the time. A lost line is also a refusal."""
+        """Run a conversation. `on_done` gets the result and the time. A lost line is also a refusal."""
 
         def done(result: T | Refusal | LinkLost, at: float) -> None:
             if isinstance(result, LinkLost):
@@ -211,7 +211,7 @@ class MissionService:
         return inf if isinstance(self.fc_store, Refusal) else self.fc_store.watch_s
 
     def seq_of(self, number: int) -> int:
-        """The seq of the item for the flight controller's record `number`; 0: none is known."""
+        """The seq of the item for the flight controller's record `number`, or 0 if none is known."""
         if isinstance(self.fc_store, Refusal) or (known := self.on_board) is None:
             return 0
         return self.fc_store.seq_of(known.records, number)
@@ -242,7 +242,7 @@ class MissionService:
         return refusal
 
     def armed_refusal(self) -> Refusal | None:
-        """The refusal if the craft is known to be armed; saves a request to a busy board."""
+        """The refusal if the craft is known to be armed. Saves a request to a busy board."""
         return ARMED if not isinstance(self.fc_store, Refusal) and self.vehicle.armed else None
 
     def close(self) -> None:

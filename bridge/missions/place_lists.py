@@ -19,7 +19,7 @@ NO_PLACES = Refusal(MissionResult.UNSUPPORTED, sentences.NO_PLACES())
 
 
 class PlaceLists(MissionService):
-    """The lists of one type; name: for texts. on_change: called when the board's list may have changed."""
+    """The lists of one type. name: for texts. on_change: called when the board's list may have changed."""
 
     def __init__(
         self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner, on_change: Callable[[], None]

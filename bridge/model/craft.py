@@ -89,7 +89,7 @@ _BOXES: tuple[tuple[FlightMode, frozenset[str]], ...] = (
 
 
 def names_of_active(box_flags: int, boxes: Sequence[str]) -> set[str]:
-    """The active boxes; `box_flags` has one bit for each of `boxes`, in their order."""
+    """The active boxes. `box_flags` has one bit for each of `boxes`, in their order."""
     return {name for bit, name in enumerate(boxes) if box_flags >> bit & 1}
 
 
@@ -136,7 +136,7 @@ def remaining_percent(voltage_v: float, cells: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """Degrees * 1e7; altitude_m above mean sea level."""
+    """Degrees * 1e7. altitude_m above mean sea level."""
 
     lat_e7: int
     lon_e7: int

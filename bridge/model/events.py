@@ -114,7 +114,7 @@ class GcsSilent(BridgeEvent):
 
 
 class GcsRefused(BridgeEvent):
-    """A ground station's frame was refused; reported once for each reason."""
+    """A ground station's frame was refused. Reported once for each reason."""
 
     name_in_log = "gcs.refused"
     level: Level = "warning"
@@ -161,7 +161,7 @@ class UploadStarted(BridgeEvent):
 
 
 class UploadEnded(BridgeEvent):
-    """The final ack of a complete list is sent; `mission` is its number in the store."""
+    """The final ack of a complete list is sent. `mission` is its number in the store."""
 
     name_in_log = "mission.upload_ended"
     station: str
@@ -192,7 +192,7 @@ class PushStarted(BridgeEvent):
 
 
 class PushEnded(BridgeEvent):
-    """The end of such a push, with or without success; `mission` is the list's number in the store."""
+    """The end of such a push, with or without success. `mission` is the list's number in the store."""
 
     name_in_log = "mission.push_ended"
     source: str

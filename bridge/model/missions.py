@@ -176,7 +176,7 @@ class FlownMission:
 
 
 class MissionProgress:
-    """Feed it every report. Records count from 1; `number` is 0 while no mission is flown."""
+    """Feed it every report. Records count from 1. `number` is 0 while no mission is flown."""
 
     def __init__(self) -> None:
         self.number = 0

@@ -93,7 +93,7 @@ class BoardSetting:
 class SettingTable:
     """All settings of a board, in its own order.
 
-    is_complete: False if some could not be read; their names are missing. left_out: how many have a name that no ground
+    is_complete: False if some could not be read. Their names are missing. left_out: how many have a name that no ground
     station or file could take. is_remembered: True if only the values are known, from the last time.
     """
 
@@ -109,7 +109,7 @@ class SettingTable:
         return len(self.settings)
 
     def find(self, name: str) -> BoardSetting | None:
-        """The setting of this name; letters of the other case are accepted if they leave no doubt."""
+        """The setting of this name. Letters of the other case are accepted if they leave no doubt."""
         alike = [setting for setting in self if setting.name.lower() == name.lower()]
         return self.settings.get(name) or (alike[0] if len(alike) == 1 else None)
 
@@ -142,7 +142,7 @@ def shown(value: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class BoardId:
-    """A flight controller. `kind`: its firmware and version. `uid`: its chip's number, in hex; "" if it has none."""
+    """A flight controller. `kind`: its firmware and version. `uid`: its chip's number, in hex, or "" if it has none."""
 
     kind: str
     uid: str = ""
@@ -183,7 +183,7 @@ class Occasion(Enum):
 
 @dataclass(frozen=True, slots=True)
 class TakenBackup:
-    """The whole table of a board; mostly equal to the one before."""
+    """The whole table of a board. Mostly equal to the one before."""
 
     board: BoardId
     values: Mapping[str, Value]

@@ -261,7 +261,7 @@ class Vehicle:
         self.heard_at: float | None = None
         self.track = GroundTrack()
         self._readings.clear()
-        #: The kinds of readings heard; their reader replaces the set.
+        #: The kinds of readings heard. Their reader replaces the set.
         self.news: set[type[Reading]] = set()
         self._cells = 1
         #: False before the first arming, while home is only the place of the craft.

@@ -153,7 +153,7 @@ class BoardSettings:
         self.due = now
 
     def change(self, name: str, value: Value, on_done: OnDone, now: float, client: str = "") -> None:
-        """Change a setting in the board's RAM; `on_done` gets it as read back, maybe before this returns.
+        """Change a setting in the board's RAM. `on_done` gets it as read back, maybe before this returns.
 
         The same request of a client that still waits is not repeated, and does not get an answer of its own.
         """

@@ -61,7 +61,7 @@ class KnownSettings:
         self.unsaved: dict[str, Value] = {}
         #: True if the board's flash is known to hold the settings in its RAM.
         self.is_saved = False
-        #: None until the settings of a board were read; those of a lost board stay.
+        #: None until the settings of a board were read. Those of a lost board stay.
         self.state: SettingsState | None = None
         #: Changes through the bridge may be among the differences that the next reading finds.
         self._is_ours = False

@@ -277,7 +277,7 @@ class Parameters:
                 self.due = -inf
 
     def _described(self) -> Mapping[str, BoardSetting]:
-        """The settings for the files; none while only their values are known."""
+        """The settings for the files, or none while only their values are known."""
         table = self._settings.known.table
         return {} if table is None or table.is_remembered else self._named
 

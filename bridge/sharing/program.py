@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from bridge.gcs.budget import Rate, TokenBucket
 from protocols.msp.frame import Direction, MspFrame, MspParser, request
 
-#: mwp asks up to 190 times a second if it is answered at once; more than this is a flood.
+#: mwp asks up to 190 times a second if it is answered at once. More than this is a flood.
 _LIMIT = Rate(200, 200)
 #: Programs mostly wait for a reply before they ask again.
 _MAX_WAITING = 16

@@ -51,7 +51,7 @@ class MissionDownloads:
         self._ask(_Question(sender, None, as_int=True), now)
 
     def request(self, sender: Sender, seq: int, now: float, *, as_int: bool) -> None:
-        """MISSION_REQUEST or MISSION_REQUEST_INT; item 0 is served at any time (Mission Planner asks on arming)."""
+        """MISSION_REQUEST or MISSION_REQUEST_INT. Item 0 is served at any time (Mission Planner asks on arming)."""
         question = _Question(sender, seq, as_int)
         download = self._memory(sender).download
         if download is not None and now < download.until and download.fc_store is self._missions.fc_store:

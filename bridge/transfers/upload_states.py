@@ -68,7 +68,7 @@ class Ended(Event):
 
 
 class UploadState:
-    """A state ends at `deadline`, `seconds` after the start or last progress; `timeout` is then the answer."""
+    """A state ends at `deadline`, `seconds` after the start or last progress. `timeout` is then the answer."""
 
     seconds: float
     timeout: Refusal
@@ -140,7 +140,7 @@ class Receiving(UploadState):
 
 
 class Closing(Receiving):
-    """Mission Planner's "Write Fast" has ended; delayed items may still arrive."""
+    """Mission Planner's "Write Fast" has ended. Delayed items may still arrive."""
 
     seconds = 0.3
 
@@ -209,7 +209,7 @@ class DeliveringUnanswered(Delivering):
 
 @dataclass(eq=False)
 class Upload:
-    """One ground station's upload of `count` items; a clear has 0.
+    """One ground station's upload of `count` items. A clear has 0.
 
     `mission_type`: MAV_MISSION_TYPE of the final MISSION_ACK. `heard_at`: when its ground station last sent a message
     of it. `number`: of the frame that began it.

@@ -2,7 +2,7 @@
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
 Lists are received in parallel, and written one at a time. Mission Planner loses some packets, and takes any ack to
-MISSION_COUNT as "continue"; most special cases below respond to a behaviour listed in docs/ground-stations.md.
+MISSION_COUNT as "continue". Most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
 from collections.abc import Iterator, Sequence

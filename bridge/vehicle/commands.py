@@ -255,7 +255,7 @@ def _msgid(param: float) -> int:
 def _action(command: int, params: Sequence[float]) -> FcAction | None:
     """The flight controller action for a command, or None if there is none.
 
-    MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time; param2 for the compass, param5 for the accelerometers (1, 2 for
+    MAV_CMD_PREFLIGHT_CALIBRATION: one sensor at a time. param2 for the compass, param5 for the accelerometers (1, 2 for
     "level", 4 for "simple": these boards have one for all).
     """
     if command == messages.MAV_CMD_DO_START_MAG_CAL and params[0] in (0, 1):  # all compasses, or the first

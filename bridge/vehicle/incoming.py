@@ -85,7 +85,7 @@ class Incoming:
     """Checks, counts, and answers or passes on every frame from a ground station.
 
     Refusals are logged once for each station and reason; bridge/gcs/rights.py has their policy. `routes` is set while
-    an autopilot that represents itself is on the line; frames then go to it unchanged.
+    an autopilot that represents itself is on the line. Frames then go to it unchanged.
     """
 
     def __init__(

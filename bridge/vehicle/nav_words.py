@@ -8,7 +8,7 @@ from bridge.voice.happening import Sentence
 from bridge.voice.sentences import EMERGENCY, NAVIGATION
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavState, NavStatus
 
-#: Legs may be shorter; the words of the last are said.
+#: Legs may be shorter. The words of the last are said.
 _INTERVAL_S = 2.0
 #: With the current and the last item's number, as the ground station counts them.
 _EN_ROUTE, _HOLDING = "TO WP {}/{}", "HOLDING WP {}/{}"
@@ -25,7 +25,7 @@ _WORDS: Mapping[int, str] = {
 
 
 def nav_words(status: NavStatus, *, is_plane: bool) -> str:
-    """The words, with two places for item numbers while a mission is flown; "" if INAV's OSD has none."""
+    """The words, with two places for item numbers while a mission is flown, or "" if INAV's OSD has none."""
     if status.mode == NavMode.MISSION:
         if status.error == FINISHED:
             return "WP END>LANDED" if status.action == NavAction.LAND else "WP END>HOLDING POSITION"
@@ -51,7 +51,7 @@ class NavWords:
         self._said_at = -inf
 
     def changed(self, status: NavStatus | None, now: float, *, is_plane: bool) -> str:
-        """The words to say now; "" if they were said already, or too soon. status: None unless it flies."""
+        """The words to say now, or "" if they were said already, or too soon. status: None unless it flies."""
         words = "" if status is None else nav_words(status, is_plane=is_plane)
         said = words, status.number if status is not None and "{}" in words else 0
         if said == self._said or (words and now < self._said_at + _INTERVAL_S):

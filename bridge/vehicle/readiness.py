@@ -23,7 +23,7 @@ from bridge.voice.happening import Happening
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
 
-#: Silence that counts as a loss; a switch of protocol takes less.
+#: Silence that counts as a loss. A switch of protocol takes less.
 _LOST_S = 3.0
 #: Silence that counts as a loss at the start: sensing the speed takes a few seconds.
 _NOT_FOUND_S = 10.0

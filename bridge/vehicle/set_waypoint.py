@@ -41,7 +41,7 @@ class SetWaypoint:
         return isinstance(self._missions.fc_store, FliesToItems)
 
     def begin(self, sender: Sender, seq: float, on_end: Callable[[Refusal | None], None], now: float) -> None:
-        """Make the craft fly to item `seq`, in the station's numbers; `on_end` gets None once it does.
+        """Make the craft fly to item `seq`, in the station's numbers. `on_end` gets None once it does.
 
         A repetition of the request in progress is ignored.
         """
@@ -85,7 +85,7 @@ class SetWaypoint:
         return None if sender.station.allows(Cost.BOARD) else _BUSY
 
     def _as_read(self, held: HeldMission, sender: Sender, seq: float) -> int:
-        """The number in the list as read back of the item that the station calls `seq`; 0: none."""
+        """The number in the list as read back of the item that the station calls `seq`, or 0 if there is none."""
         numbers = self._vehicle.sent_seqs(sender.station) or range(len(held.items))
         return next((number for number, shown in enumerate(numbers) if shown == seq), 0)
 

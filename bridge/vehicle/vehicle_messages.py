@@ -141,7 +141,7 @@ class Moment:
         return None if home is None or home.altitude_m is None or height is None else home.altitude_m + height.height_m
 
 
-#: Makes a message of the vehicle at a moment; raises Unknown if too little is known.
+#: Makes a message of the vehicle at a moment. Raises Unknown if too little is known.
 Maker = Callable[[Moment], Message]
 
 
@@ -296,7 +296,7 @@ def global_position_int(at: Moment) -> Message:
 def vfr_hud(at: Moment) -> Message:
     """VFR_HUD: m/s, degrees, percent of the throttle stick, metres above mean sea level.
 
-    Without a sensor a copter's airspeed is the ground speed, as with ArduCopter; a plane's is unknown. Heading and
+    Without a sensor a copter's airspeed is the ground speed, as with ArduCopter. A plane's is unknown. Heading and
     throttle have no "unknown", so both must be there.
     """
     orientation, channels_us = at.need(v.Orientation), at.need(v.Sticks).channels_us
@@ -318,7 +318,7 @@ def vfr_hud(at: Moment) -> Message:
 
 
 def sys_status(at: Moment) -> Message:
-    """SYS_STATUS: mV, cA; errors_comm counts the failed I2C reads.
+    """SYS_STATUS: mV, cA. errors_comm counts the failed I2C reads.
 
     Only what is known is enabled: Mission Planner replaces the line on the HUD by the first enabled sensor that is not
     healthy. A GPS without a 3D fix is not: to MAVSDK its bit means a good position.
@@ -407,7 +407,7 @@ def rc_channels(at: Moment) -> Message:
 
 
 def raw_imu(at: Moment) -> Message:
-    """RAW_IMU: 1/1000 g; gyro and compass in the flight controller's own scale."""
+    """RAW_IMU: 1/1000 g. Gyro and compass in the flight controller's own scale."""
     imu = at.need(v.ImuSample)
     x, y, z = (_fit(axis, 16) for axis in imu.acc_mg)
     return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, x, y, z, *imu.gyro, *imu.mag)
@@ -498,7 +498,7 @@ def system_time(at: Moment) -> Message:
 
 
 def extended_sys_state(at: Moment) -> Message:
-    """EXTENDED_SYS_STATE: on the ground while disarmed; armed as a mission flight reports, or by height and speed."""
+    """EXTENDED_SYS_STATE: on the ground while disarmed. Armed as a mission flight reports, or by height and speed."""
     landed_state = int(messages.MAV_LANDED_STATE_UNDEFINED)
     if not at.readiness.is_lost:
         known(at.need(v.FlightState).armed)
@@ -523,7 +523,7 @@ def _landed_state(at: Moment) -> int:
 
 
 def home_position(at: Moment) -> Message:
-    """HOME_POSITION: degrees * 1e7, mm above mean sea level; the local frame has its origin there."""
+    """HOME_POSITION: degrees * 1e7, mm above mean sea level. The local frame has its origin there."""
     home = known(at.vehicle.home)
     altitude_mm = _fit(round(known(home.altitude_m) * 1000), 32)
     place = (home.lat_e7, home.lon_e7, altitude_mm)

@@ -23,7 +23,7 @@ from protocols.mavlink.dialect import messages as m
 _GROUND_STATION = 190
 #: base_mode in QGroundControl's heartbeat (MultiVehicleManager::_sendGCSHeartbeat); others send 0.
 _MODE_OF_QGC = 192
-#: Mission Planner's Resume Mission repeats a refused command every second, for 30 s; a pilot who tries again gets the
+#: Mission Planner's Resume Mission repeats a refused command every second, for 30 s. A pilot who tries again gets the
 #: reason again.
 _ATTEMPT_S = 1.5
 #: Beyond this limit a text may be repeated within an attempt.

@@ -36,7 +36,7 @@ def decode(frame: MavlinkFrame) -> Message | None:
 
 
 class Packed(NamedTuple):
-    """A payload, whole and as MAVLink 2 sends it (without trailing zeros); receivers differ only in the header."""
+    """A payload, whole and as MAVLink 2 sends it (without trailing zeros). Receivers differ only in the header."""
 
     msgid: int
     payload_v1: bytes
@@ -124,7 +124,7 @@ class FrameWriter:
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
-        """A frame of MAVLink 1 or 2; always 2 if MAVLink 1 has no such message."""
+        """A frame of MAVLink 1 or 2. Always 2 if MAVLink 1 has no such message."""
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
         if version == 1 and not packed.is_v2_only:

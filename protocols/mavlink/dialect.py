@@ -22,9 +22,9 @@ _LAST_V1_ID = 255
 
 
 class MessageFormat(NamedTuple):
-    """The name, checksum seed and layout of one kind of message; sizes and places are in bytes of the payload.
+    """The name, checksum seed and layout of one kind of message. Sizes and places are in bytes of the payload.
 
-    Sizes: `full_size` with extension fields; `base_size` without, as in MAVLink 1 (None: the id is above 255, so not in
+    Sizes: `full_size` with extension fields. `base_size` without, as in MAVLink 1 (None: the id is above 255, so not in
     MAVLink 1). Places: None if the message has no such field.
     """
 

@@ -24,7 +24,7 @@ _AUTOPILOT, _NO_AUTOPILOT = 5, 8
 _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
-#: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes; the payload may be shorter than the message,
+#: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes. The payload may be shorter than the message,
 #: without trailing zeros, or longer, with newer extensions. MAVLink 1: by payload size and message id. It has no
 #: extensions, but pymavlink sends them anyway, and mavlink's C parser accepts them.
 _CRC_EXTRA_V2 = {msgid.to_bytes(3, "little"): bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
@@ -164,7 +164,7 @@ class MavlinkSplitter:
         return bool(self._buffer)
 
     def feed(self, data: bytes, *, is_end: bool = False) -> list[MavlinkFrame]:
-        """Take received bytes; return the completed frames.
+        """Take received bytes. Return the completed frames.
 
         `is_end` (silence, end of a datagram): drop an incomplete frame, and find those in its bytes.
         """

@@ -14,7 +14,7 @@ from protocols.plain_text import plain_text
 _HEADER = struct.Struct("<HBBBBBBI")
 _PAYLOAD_SIZE, _OPCODE_AT = 251, 3
 MOST_DATA = _PAYLOAD_SIZE - _HEADER.size
-#: Packets of one burst; the client asks for the next ones.
+#: Packets of one burst. The client asks for the next ones.
 _BURST = 16
 _ACK, _NAK = 128, 129
 #: FailErrno and EOPNOTSUPP. Mission Planner ignores "unknown command" and repeats its request for 70 s.
@@ -48,7 +48,7 @@ class FtpSession:
         self._file: bytes | None = None
 
     def answer(self, payload: Sequence[int]) -> Iterator[list[int]]:
-        """The payloads of the replies to a request's payload; none if it is not a request."""
+        """The payloads of the replies to a request's payload, or none if it is not a request."""
         request = bytes(payload)
         if len(request) < _HEADER.size:
             return

@@ -38,7 +38,7 @@ def has_wp_lines(text: str) -> bool:
 
 
 def read_nav_xml(root: Element, name: str, note: Note) -> list[MissionItem]:
-    """Read the mission's items, home first; MissionFileError names the missionitem."""
+    """Read the mission's items, home first. MissionFileError names the missionitem."""
     records = [_from_xml(item, name, f"missionitem {place}") for place, item in enumerate(root.iter("missionitem"), 1)]
     home = None
     for planned in root.iter("mwp"):

@@ -22,7 +22,7 @@ from protocols.plain_text import file_text, shown
 #: Characters. The parsed tree takes up to forty times the memory of the text.
 _MAX_SIZE = 2 * 2**20
 _FEET = 0.3048
-#: The frame of a height, by KML's altitudeMode; heights of paths on the ground have no meaning.
+#: The frame of a height, by KML's altitudeMode. Heights of paths on the ground have no meaning.
 _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
 _CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
 _CSV_ALT = {"altitude(m)": 1.0, "altitude": 1.0, "alt": 1.0, "height": 1.0, "altitude(ft)": _FEET}

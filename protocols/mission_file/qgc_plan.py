@@ -26,7 +26,7 @@ _SAVE_AGAIN = "save it again from QGroundControl"
 
 
 def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
-    """Read the items, home first; MissionFileError names the file and the entry of mission.items, from 1."""
+    """Read the items, home first. MissionFileError names the file and the entry of mission.items, from 1."""
     plan = _parse(text, name)
     if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
         what = 'this is not a QGroundControl plan, its fileType is not "Plan"'
@@ -72,7 +72,7 @@ def _other_parts(plan: dict[str, Any]) -> str:
 
 
 def write_qgc_plan(items: Sequence[MissionItem]) -> str:
-    """The items as a file's text, the first as the planned home; `read_qgc_plan` reads the same again."""
+    """The items as a file's text, the first as the planned home. `read_qgc_plan` reads the same again."""
     home = [_degrees(items[0].lat_e7), _degrees(items[0].lon_e7), items[0].alt_m] if items else [0, 0, 0]
     mission = {
         "version": 2,
@@ -179,7 +179,7 @@ def _integer(entry: dict[str, Any], key: str, highest: int, name: str, where: st
 
 
 def _number(value: Any, name: str, where: str) -> float:
-    """Return a JSON number; null is NaN, "not given"."""
+    """Return a JSON number. Null is NaN, "not given"."""
     if value is None:
         return math.nan
     if type(value) in (int, float):

@@ -55,7 +55,7 @@ def has_header(line: str) -> bool:
 
 
 def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
-    """Read the items, home first; MissionFileError names the file and the line.
+    """Read the items, home first. MissionFileError names the file and the line.
 
     A file without items is an error: it is more likely truncated than meant to erase a mission.
     """
@@ -100,7 +100,7 @@ def _fields_110(fields: list[str], name: str, where: str) -> list[str]:
 
 
 def _fields(line: str) -> list[str]:
-    """The fields of a line; commas separate them unless tabs or semicolons do."""
+    """The fields of a line. Commas separate them unless tabs or semicolons do."""
     line = line.replace(";", "\t")
     if "\t" not in line and line.count(",") >= _FIELD_COUNT - 2:
         return [field.strip() for field in line.split(",")]
@@ -124,7 +124,7 @@ def _numbered(items: list[MissionItem], note: Note, *, has_home: bool) -> list[M
 
 
 def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
-    """The items as a file's text; `read_qgc_wpl` reads the same items again."""
+    """The items as a file's text. `read_qgc_wpl` reads the same items again."""
     return "".join(f"{line}\n" for line in ["QGC WPL 110", *map(_line, items)])
 
 

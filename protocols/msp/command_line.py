@@ -2,10 +2,10 @@
 """The command line that shares the port with MSP: the bytes that open it, and how a board in it is recognised.
 
 Harakiri acts on three equal bytes in a row anywhere in the stream, inside frames and across their boundaries (serial.c,
-serialCom): 0x0D enters the command line; in AUTOSENSE '#' does so too, and 'R' resets the board. See
+serialCom): 0x0D enters the command line. In AUTOSENSE '#' does so too, and 'R' resets the board. See
 docs/msp-mission.md, "Masked bodies".
 
-In its command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`; a looped-back line
+In its command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`. A looped-back line
 returns it whole. DEL erases a character of the typed line. This applies to Harakiri (cli.c, tree TestCode3), Baseflight
 and INAV; HarakiriWebstore1 ignores DEL.
 """

@@ -16,7 +16,7 @@ FEATURE_SIZE = 4
 GEOZONE_FEATURE = 1 << 4
 SAFEHOME, SET_SAFEHOME, FW_APPROACH, SET_FW_APPROACH = 0x2038, 0x2039, 0x204A, 0x204B
 GEOZONE, SET_GEOZONE, GEOZONE_VERTEX, SET_GEOZONE_VERTEX = 0x2210, 0x2211, 0x2212, 0x2213
-#: MAX_SAFE_HOMES, MAX_GEOZONES_IN_CONFIG, MAX_VERTICES_IN_CONFIG; a circle takes two vertices.
+#: MAX_SAFE_HOMES, MAX_GEOZONES_IN_CONFIG, MAX_VERTICES_IN_CONFIG. A circle takes two vertices.
 SAFEHOMES, GEOZONES, VERTICES = 8, 63, 126
 _SAFEHOME = struct.Struct("<BBii")
 _APPROACH = struct.Struct("<BiiBhhB")
@@ -33,7 +33,7 @@ MISSION_APPROACH = SAFEHOMES
 class FwApproach(NamedTuple):
     """How an aeroplane lands. Heights above home, or above sea level.
 
-    headings: of the landing, degrees; a negative one is not flown in the opposite direction, 0 is none.
+    headings: of the landing, degrees. A negative one is not flown in the opposite direction, 0 is none.
     """
 
     number: int
@@ -96,8 +96,8 @@ class Corner(NamedTuple):
 class Geozone:
     """number: from 0. corners: of a polygon, or a circle's centre. radius_cm: 0 for a polygon.
 
-    lowest_cm, highest_cm: 0 is the ground, and no limit; above sea level if is_above_sea, else above home.
-    missing: vertices that the board counts, but lacks; one is enough for INAV to turn all zones off.
+    lowest_cm, highest_cm: 0 is the ground, and no limit. Above sea level if is_above_sea, else above home.
+    missing: vertices that the board counts, but lacks. One is enough for INAV to turn all zones off.
     """
 
     number: int

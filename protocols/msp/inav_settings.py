@@ -14,7 +14,7 @@ COMMON_SETTING, COMMON_SET_SETTING, COMMON_SETTING_INFO = 0x1003, 0x1004, 0x1007
 _DETAILS = struct.Struct("<HBBBiIHBB")
 _INDEX = struct.Struct("<BH")
 _LOOKUP = 1 << 6
-#: Profiles of each kind: control, rates, batteries; of mixers only two.
+#: Profiles of each kind: control, rates, batteries. Of mixers only two.
 _PROFILES = 3
 
 

@@ -190,7 +190,7 @@ def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
 def find_mask(body: bytes, fixed_xor: int) -> int | None:
     """Find the smallest mask that keeps mask, masked body and checksum free of hazards.
 
-    `body` has an even length; `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
+    `body` has an even length. `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
     None if there is no such mask, which cannot happen for bodies of up to 83 bytes.
     """
     unfit = {*HAZARDS}

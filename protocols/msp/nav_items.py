@@ -20,7 +20,7 @@ HIGHEST_HEADING = 359
 
 
 def home_item(place: tuple[int, int] | None, alt_m: float = 0.0) -> MissionItem:
-    """Item 0: home, if known; `place` in degrees * 1e7."""
+    """Item 0: home, if known. `place` in degrees * 1e7."""
     lat_e7, lon_e7 = place or (0, 0)
     return MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, 0, 0, 0, 0, lat_e7, lon_e7, alt_m)
 

@@ -100,7 +100,7 @@ _PID_SIZE = 3
 
 
 def fields(request: SettingsRequest, payload: bytes, pids: Sequence[str], boxes: Sequence[str]) -> tuple[Field, ...]:
-    """The settings in a reply, each with a unique name; bytes without a name are left out. None of mode ranges.
+    """The settings in a reply, each with a unique name. Bytes without a name are left out. None of mode ranges.
 
     pids, boxes: the flight controller's names, in the order of PID and BOX.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replies with the vehicle's state. Harakiri's lengths are the minimum; related firmware sends longer ones.
+"""Replies with the vehicle's state. Harakiri's lengths are the minimum. Related firmware sends longer ones.
 
 Layouts: Harakiri's serial.c; INAV's fc_msp.c. A payload that is too short gives None.
 """
@@ -29,7 +29,7 @@ _MIN_CHANNELS, _MAX_CHANNELS = 4, 18
 
 
 class Sensor(IntFlag):
-    """Bits of MSP_STATUS: the sensors that are fitted and respond; the same on all firmware."""
+    """Bits of MSP_STATUS: the sensors that are fitted and respond. The same on all firmware."""
 
     ACCELEROMETER = 1
     BAROMETER = 2
@@ -62,7 +62,7 @@ class StatusReport(NamedTuple):
 
 
 class RawImu(NamedTuple):
-    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass; each firmware has its own units."""
+    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass. Each firmware has its own units."""
 
     acc: tuple[int, int, int]
     gyro: tuple[int, int, int]
@@ -86,7 +86,7 @@ class RawGps(NamedTuple):
 
 
 class Analog(NamedTuple):
-    """MSP_ANALOG: receiver strength 0..1023; mAh drawn and current (0.01 A, on MultiWii 0.1 A) where they are sent.
+    """MSP_ANALOG: receiver strength 0..1023. MAh drawn and current (0.01 A, on MultiWii 0.1 A) where they are sent.
 
     A missing sensor reads 0. Where the voltage has only one byte, it ends at 25.5 V.
     """

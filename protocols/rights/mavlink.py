@@ -24,7 +24,7 @@ class FieldRule:
 
 _PAYLOAD_SIZE = 255
 _FLOAT = struct.Struct("<f")
-#: FTP opcodes that read, or end a session (https://mavlink.io/en/services/ftp.html); the others write files.
+#: FTP opcodes that read, or end a session (https://mavlink.io/en/services/ftp.html). The others write files.
 _FTP_READS = frozenset({0, 1, 2, 3, 4, 5, 14, 15, 128, 129})
 #: The longest interval that is not called silence, us: like a stream's lowest rate.
 _SLOWEST_US = 1e6

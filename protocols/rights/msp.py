@@ -218,7 +218,7 @@ _BETAFLIGHT: Rights = {
     **_moves(SET_WP=209, SEND_DSHOT_COMMAND=0x3003),
     **_refused(MULTIPLE_MSP=230),
 }  # fmt: skip
-#: Only later versions understand v2; the first ones have the buffer of MultiWii.
+#: Only later versions understand v2. The first ones have the buffer of MultiWii.
 _CLEANFLIGHT: Rights = {
     command: right._replace(lengths=range(_BUFFER + 1)) if right.effect is Effect.CHANGE else right
     for command, right in _BETAFLIGHT.items()

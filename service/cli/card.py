@@ -46,7 +46,7 @@ _HEADER_SIZE, _SIZE = 60, slice(48, 58)
 _MOST_CONTROL = 1 << 20
 #: The boot partition's place: from bookworm on, and before.
 _FIND = "for boot in /boot/firmware /boot; do [ ! -e $boot/naze-bridge/{0} ] || exec sh $boot/naze-bridge/{0}; done"
-#: Once the folder is renamed, all is done; a power cut may have left a part of it.
+#: Once the folder is renamed, all is done. A power cut may have left a part of it.
 _CLEAN_UP = f"rm -rf /boot/firmware/{FOLDER}.done /boot/{FOLDER}.done; rm -f {_UNIT} {_LINK}"
 #: In firstrun.sh, where no network runs. The Imager's cmdline.txt restarts the Pi after it.
 _IN_FIRSTRUN = f"({_FIND.format('enable.sh')})"
@@ -72,7 +72,7 @@ ln -sf {_UNIT} {_LINK}
 [ "${{1-}}" != start ] || {{ systemctl daemon-reload; systemctl start --no-block naze-bridge-card; }}
 """
 #: Each step may be cut by the end of the power, and is then repeated. The result is for a person with the card in a PC,
-#: the LED for a person without one; `led` gets the times on and off, ms (the kernel's ledtrig-timer).
+#: the LED for a person without one. `led` gets the times on and off, ms (the kernel's ledtrig-timer).
 _FIRST_BOOT = """\
 #!/bin/sh
 # Written by `naze-bridge card`. Its log is {log}.

@@ -117,7 +117,7 @@ def _has_c_library() -> bool:
 
 
 def _run(*command: str) -> None:
-    """Run a program in this terminal; its failure is ours."""
+    """Run a program in this terminal. Its failure is ours."""
     done = subprocess.run(command, check=False)  # noqa: S603  # the user's own folder
     if done.returncode:
         raise SystemExit(done.returncode)

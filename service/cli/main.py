@@ -118,5 +118,5 @@ def main() -> None:
     """Companion bridge between a MultiWii-family flight controller and MAVLink ground stations.
 
     Exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable file, 74 the output cannot be written, 130
-    interrupted; the help of a command names its own.
+    interrupted. The help of a command names its own.
     """

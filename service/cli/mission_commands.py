@@ -112,7 +112,7 @@ def _print_delivery(delivery: Json) -> None:
 
 
 def show_delivery(client: BridgeClient, delivery: Json) -> None:
-    """Print the list as sent and as held; ends the program with status 1 or 3 if it was not accepted."""
+    """Print the list as sent and as held. Ends the program with status 1 or 3 if it was not accepted."""
     client.show(delivery, lambda: _print_delivery(delivery))
     if _would_erase(delivery):
         raise SystemExit(_WOULD_ERASE)

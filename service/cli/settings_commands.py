@@ -232,7 +232,7 @@ def _like(values: SettingValues, other: SettingValues, held: Json) -> SettingVal
 
 
 def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[SettingValues, str]:
-    """The settings that a word on the command line names, and the board they are from; "" if it is unknown.
+    """The settings that a word on the command line names, and the board they are from, or "" if it is unknown.
 
     held: the present board's, if they are known already.
     """

@@ -33,7 +33,7 @@ def _print_lines(lines: Sequence[tuple[str, str]]) -> None:
 
 
 def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tuple[str, str]]:
-    """Yield a name and a text for each line; `addresses` are this machine's own."""
+    """Yield a name and a text for each line. `addresses` are this machine's own."""
     yield "Bridge", f"naze-bridge {facts['version']}, running for {duration(facts['uptime_s'])}"
     yield "Flight controller", _flight_controller(facts, host)
     if facts["flight_controller"] is not None:

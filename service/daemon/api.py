@@ -39,7 +39,7 @@ class DaemonApi:
         self.firmware = FirmwareApi(daemon, self.settings, daemon.settings.state_dir or state_dir)
 
     async def do(self, request: Json, progress: Callable[[Json], None]) -> Json:
-        """Handle a request; `progress` is called with each step. ControlError, StoreError or ValueError on failure."""
+        """Handle a request. `progress` is called with each step. ControlError, StoreError or ValueError on failure."""
         match request.get("do"):
             case "push":
                 source = str(request.get("source"))[:_MAX_SOURCE]
@@ -166,7 +166,7 @@ class DaemonApi:
         return _fields(mission) | {"received": _fields(received) | as_text}
 
     async def restore(self, number: int, progress: Callable[[Json], None]) -> Json:
-        """Push a stored mission again, as it was sent; the current rules apply."""
+        """Push a stored mission again, as it was sent. The current rules apply."""
         data = await self.show_mission(number)
         return await self.push(mission_items(data["received"]["items"]), f"restore of mission {number}", progress)
 

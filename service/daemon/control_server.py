@@ -22,7 +22,7 @@ from service.daemon.daemon import Daemon
 from storage.os_error import reason
 from storage.store_error import StoreError
 
-#: asyncio buffers twice as much for each client; a list of 146 items has 40 kB.
+#: asyncio buffers twice as much for each client. A list of 146 items has 40 kB.
 _MAX_LINE = 1 << 18
 #: Further clients are disconnected.
 _MAX_CLIENTS = 16
@@ -122,7 +122,7 @@ class ControlServer:
             send({"error": f"request not understood: {error}"})
         except ConnectionError:
             pass
-        except asyncio.CancelledError:  # by close(); asyncio's streams would log it as an error
+        except asyncio.CancelledError:  # by close(). asyncio's streams would log it as an error
             send({"error": f"the daemon stopped before it could reply; {_LOOK}"})
 
 

@@ -109,7 +109,7 @@ class Daemon:
             ),
             self._loop.time(),
         )
-        #: Per link; the flight controller's port is named "fc".
+        #: Per link. The flight controller's port is named "fc".
         self.traffic: defaultdict[str, Traffic] = defaultdict(Traffic)
         self.fc = FcConnection(settings, host, self.bridge, self.traffic["fc"], self.flush)
         self.gcs = GcsConnections(self.bridge, self.traffic, self.flush)
@@ -268,7 +268,7 @@ class Daemon:
         """
         error = context.get("exception")
         if isinstance(error, OSError) and "accept" in context["message"]:
-            # No file descriptor is left for a new client; asyncio retries every second.
+            # No file descriptor is left for a new client. asyncio retries every second.
             warn_once(self._warned, "daemon.cannot_accept", why=reason(error))
             return
         _log.error("daemon.fault", what=context["message"], exc_info=error)

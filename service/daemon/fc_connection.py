@@ -66,7 +66,7 @@ class FcConnection:
 
     @property
     def where(self) -> str:
-        """The port or address; while no port is open, the kinds of port searched."""
+        """The port or address. While no port is open, the kinds of port searched."""
         return str(self._address) if self._finder is None else self._finder.where
 
     @property

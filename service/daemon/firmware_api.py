@@ -46,7 +46,7 @@ _USB_V = 5.5
 _BY_HAND_S = 90.0
 #: After `flash`, or for a boot loader left by an interrupted flash.
 _BOOT_LOADER_S = 5.0
-#: A whole chip takes 60 s; the port comes back after this time in any case.
+#: A whole chip takes 60 s. The port comes back after this time in any case.
 _LONGEST_S = 600.0
 #: A Harakiri that looks for the GPS boots for 25 s, then it is identified.
 _PROOF_S = 45.0

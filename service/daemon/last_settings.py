@@ -9,7 +9,7 @@ from bridge.model.settings import BoardId, Value
 from service.machine.state_file import StateFile
 
 SETTINGS_FILE = "last-settings.json"
-#: Boards; the one read least recently is forgotten first. An INAV's settings are 25 kB.
+#: Boards. The one read least recently is forgotten first. An INAV's settings are 25 kB.
 _MOST = 16
 
 

@@ -76,7 +76,7 @@ async def _feed_watchdog(daemon: Daemon, notifier: Notifier, watchdog_s: float) 
 async def _reload_on_request(
     requested: asyncio.Event, daemon: Daemon, notifier: Notifier, load: Callable[[], Settings]
 ) -> None:
-    """Apply the result of `load` each time `requested` is set; invalid settings do not change anything."""
+    """Apply the result of `load` each time `requested` is set. Invalid settings do not change anything."""
     # Ready when ground stations can connect: the flight controller may appear at any time.
     await daemon.started.wait()
     notifier.ready()

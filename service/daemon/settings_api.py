@@ -75,7 +75,7 @@ class SettingsApi:
         return plain(await self._answer(plan))
 
     async def restore(self, values: SettingValues, board: str, client: str, progress: Progress) -> Json:
-        """Set, save and verify; `progress` is called with the number of settings set so far."""
+        """Set, save and verify. `progress` is called with the number of settings set so far."""
 
         def set_so_far(count: int) -> None:
             progress({"progress": count})

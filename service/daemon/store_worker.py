@@ -32,7 +32,7 @@ _log = structlog.get_logger()
 class StoreWorker:
     """Carries out the bridge's store effects in order. Without a `directory` it does not store anything.
 
-    In an unusable directory missions are kept in memory; `on_trouble` gets the reason, on the event loop.
+    In an unusable directory missions are kept in memory. `on_trouble` gets the reason, on the event loop.
     """
 
     def __init__(self, directory: Path | None, on_trouble: Callable[[str], None] = lambda _why: None) -> None:
@@ -46,7 +46,7 @@ class StoreWorker:
             self._thread.submit(partial(self._open, directory))
 
     def carry_out(self, effect: StoreEffect, answer: Callable[[object], None]) -> None:
-        """Run an effect on the worker's thread; `answer` is called on the event loop."""
+        """Run an effect on the worker's thread. `answer` is called on the event loop."""
 
         def work() -> None:
             post(self._loop, answer, self._do(effect))

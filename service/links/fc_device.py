@@ -24,7 +24,7 @@ DEVICE_ERRORS = (OSError, termios.error, ValueError)
 _LAST_FRAME_S = 0.1
 _TIMEOUT_S = 3.0
 #: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries data
-#: at once; the old one might wait for as long again as the gap was.
+#: at once. The old one might wait for as long again as the gap was.
 _TCP_STALL_MS = 5000
 
 

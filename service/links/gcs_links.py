@@ -29,14 +29,14 @@ class GcsLink(Protocol):
     name: str
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send without blocking; drop data that the socket does not accept."""
+        """Send without blocking. Drop data that the socket does not accept."""
 
     def close(self) -> None:
         """Close the sockets."""
 
 
 def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
-    """Open a link; LinkError gives the reason if that fails."""
+    """Open a link. LinkError gives the reason if that fails."""
     try:
         if address.kind == "tcpin":
             return TcpLink(address, events)

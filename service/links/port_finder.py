@@ -127,7 +127,7 @@ class PortFinder:
         self._memory.close()
 
     def happened(self, event: BridgeEvent) -> None:
-        """Remember the flight controller's port; wait for a lost one to come back."""
+        """Remember the flight controller's port. Wait for a lost one to come back."""
         if self._present is None:
             return
         if isinstance(event, FcFound | FcInCommandLine):
@@ -155,7 +155,7 @@ class PortFinder:
         return sorted(left, key=lambda port: port.key != self._memory.flight_controller)
 
     async def _try(self, port: SerialPort) -> serial.Serial:
-        """Open a port that may have a flight controller; PortError says why it is skipped."""
+        """Open a port that may have a flight controller. PortError says why it is skipped."""
         if (other := self._memory.others.get(port.key)) is not None:
             raise PortError(f"{other} was heard there")
         if (user := find_user(self._host, port.path)) is not None:

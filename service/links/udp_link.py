@@ -22,10 +22,10 @@ from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, bindable, 
 from storage.os_error import reason
 
 _DATAGRAM_SIZE = 2048
-#: Bytes taken in one wake-up, so that a flood cannot starve the flight controller's port; a datagram counts as at least
+#: Bytes taken in one wake-up, so that a flood cannot starve the flight controller's port. A datagram counts as at least
 #: `_LEAST`.
 _AT_ONCE, _LEAST = 2048, 32
-#: Bytes of datagrams waiting to be read; the kernel may allow less. A flood drops the pilot's when it is full.
+#: Bytes of datagrams waiting to be read. The kernel may allow less. A flood drops the pilot's when it is full.
 _KERNEL_BUFFER = 1 << 20
 #: How often a host name is resolved again.
 _LOOK_UP_S = 10.0

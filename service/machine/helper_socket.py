@@ -10,7 +10,7 @@ from pathlib import Path
 
 from payloads.mission_data import Json, to_json
 
-#: A doctor on a Pi Zero takes 10 s; apt compares all packages before it accepts one.
+#: A doctor on a Pi Zero takes 10 s. apt compares all packages before it accepts one.
 _REPLY_TIMEOUT_S = 120.0
 _MAX_REPLY = 1 << 20
 #: The actions by the unit that carries them out: each has its own socket and privileges (systemd/).

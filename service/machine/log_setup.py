@@ -151,7 +151,7 @@ _recent = _Recent()
 
 
 class _FromLibraries(logging.Handler):
-    """Routes the logs of libraries (mainly asyncio) the same way; their own handler would block on a full pipe."""
+    """Routes the logs of libraries (mainly asyncio) the same way. Their own handler would block on a full pipe."""
 
     def emit(self, record: logging.LogRecord) -> None:
         level = _log.error if record.levelno >= logging.ERROR else _log.warning

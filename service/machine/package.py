@@ -16,7 +16,7 @@ def page(name: str) -> str:
 
 
 def shipped(name: str) -> Path:
-    """The file that is `name` in the repository, a path; it may be missing."""
+    """The file that is `name` in the repository, a path. It may be missing."""
     return (_INSTALLED if _IN_PACKAGE else Path(__file__).parents[2]) / name
 
 

@@ -14,7 +14,7 @@ from typing import TypeVar, TypeVarTuple
 
 import structlog
 
-#: Questions to a thread that hangs; more are refused at once. All clients together ask fewer: 48 of the page, 8 over
+#: Questions to a thread that hangs. More are refused at once. All clients together ask fewer: 48 of the page, 8 over
 #: zenoh, 16 on the control socket.
 MAX_WAITING = 100
 
@@ -24,7 +24,7 @@ _log = structlog.get_logger()
 
 
 def post(loop: asyncio.AbstractEventLoop, callback: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
-    """Call back on the loop; ignored if the loop has ended: zenoh, or a hanging disk, may notice that later."""
+    """Call back on the loop. Ignored if the loop has ended: zenoh, or a hanging disk, may notice that later."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(callback, *arguments)
 

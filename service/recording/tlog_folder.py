@@ -17,7 +17,7 @@ import structlog
 from protocols.tlog import first_stamp_us
 from storage.os_error import reason
 
-#: Mission Planner's format, but in UTC; the names of flights (the craft was armed) end in " flight".
+#: Mission Planner's format, but in UTC. The names of flights (the craft was armed) end in " flight".
 _NAME_FORMAT = "%Y-%m-%d %H-%M-%S.tlog"
 _NAME_PATTERN = re.compile(r"\d{4}-\d\d-\d\d \d\d-\d\d-\d\d( flight)?\.tlog")
 _FLIGHT = " flight"
@@ -25,7 +25,7 @@ _FLIGHT = " flight"
 _FILES = 16
 #: The pause after a failure: a full or read-only disk rarely recovers at once.
 _RETRY_S = 60.0
-#: The maximum loss in a power cut; syncing more often wears out an SD card.
+#: The maximum loss in a power cut. Syncing more often wears out an SD card.
 _SYNC_S = 5.0
 #: Disk space that logs never use: a mission must still fit.
 LEFT_FREE = 32 << 20

@@ -206,7 +206,7 @@ def bindable(host: str, port: int) -> tuple[Any, ...]:
 
 
 def client_hosts(listening: str, own: Sequence[str]) -> Sequence[str]:
-    """The hosts to give a client for a listening address; own: this machine's addresses, none without a network."""
+    """The hosts to give a client for a listening address. own: this machine's addresses, none without a network."""
     return (own or ["127.0.0.1"]) if is_any_address(listening) else [listening]
 
 
@@ -221,7 +221,7 @@ def host_port(host: str, port: int) -> str:
 
 
 def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
-    """Read "HOST:PORT", the `rest` of `text`; AddressError names `text` and its valid `forms`."""
+    """Read "HOST:PORT", the `rest` of `text`. AddressError names `text` and its valid `forms`."""
     host, colon, port = rest.rpartition(":")
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]

@@ -42,7 +42,7 @@ class Problem:
 
 
 class SettingsError(ValueError):
-    """Settings that cannot be used; one line per problem."""
+    """Settings that cannot be used. One line per problem."""
 
     def __init__(self, problems: Sequence[Problem] | str) -> None:
         self.problems = (Problem("", problems),) if isinstance(problems, str) else tuple(problems)
@@ -89,7 +89,7 @@ def _wrong(value: object, wanted: str) -> Unfit:
 
 
 def text(wanted: str = "text in quotes", parse: Callable[[str], object] = str) -> Reader:
-    """Any text; `wanted` describes it, `parse` may reject it."""
+    """Any text. `wanted` describes it, `parse` may reject it."""
 
     def read(value: object, _folder: Path) -> object:
         if not isinstance(value, str) or not value:

@@ -27,7 +27,7 @@ class ShareSettings:
 
 
 def parse_share(entry: object, _folder: Path) -> ShareSettings:
-    """Read one entry of `share`, or one [[share]] table; AddressError explains problems."""
+    """Read one entry of `share`, or one [[share]] table. AddressError explains problems."""
     address, table = parse_table(entry, "share", "tcpin:127.0.0.1:5761", ["write"])
     if address.kind not in _SHARE_KINDS:
         raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT or udpin:ADDR:PORT")
@@ -50,7 +50,7 @@ class LogLevel(StrEnum):
 class Settings(BridgeSettings):
     """The settings of a daemon. Without `state_dir` it does not store anything.
 
-    `access`: write permission per link, by its address as text; links not in it are open. `sources`: where each given
+    `access`: write permission per link, by its address as text. Links not in it are open. `sources`: where each given
     key was found ("FILE:LINE", or a flag). `zenoh` None: not used. `web` None: no status page.
     """
 

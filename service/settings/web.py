@@ -35,7 +35,7 @@ class TileSource:
 
 
 def parse_tile_source(given: str) -> TileSource:
-    """Read the address; AddressError gives the reason."""
+    """Read the address. AddressError gives the reason."""
     scheme, _, rest = given.partition("://")
     host, slash, target = rest.partition("/")
     server = _HOST.fullmatch(host)
@@ -58,7 +58,7 @@ class ListenAddress:
 
 
 def parse_listen(given: str) -> ListenAddress:
-    """Read "HOST:PORT"; AddressError gives the reason."""
+    """Read "HOST:PORT". AddressError gives the reason."""
     return ListenAddress(*parse_host_port(given, given, _FORMS))
 
 

@@ -34,7 +34,7 @@ def _endpoint(entry: object, _folder: Path) -> str:
 class ZenohSettings:
     """The `[zenoh]` table. Endpoints are in zenoh's form: "tcp/192.168.4.1:7447".
 
-    `config_file`: a zenoh configuration file; the bridge's defaults complete it.
+    `config_file`: a zenoh configuration file. The bridge's defaults complete it.
     """
 
     prefix: Annotated[str, text(parse=partial(check_name, "zenoh.prefix")), "First chunk of all zenoh keys."] = (

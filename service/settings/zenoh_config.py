@@ -11,7 +11,7 @@ from payloads.names import ZenohSettingsError
 from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 from storage.os_error import reason
 
-#: Commands up to 10 MB get a reply; larger ones are not assembled in a Pi's memory.
+#: Commands up to 10 MB get a reply. Larger ones are not assembled in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
 #: Bytes, doubled by the kernel. Two seconds of telemetry; enough for 300 kB/s at a round trip of 100 ms.
 _SEND_BUFFER_BYTES = 16 << 10
@@ -37,7 +37,7 @@ _AUTHENTICATED = ("tls/", "quic/")
 
 
 def make_config(settings: ZenohSettings) -> zenoh.Config:
-    """The session's configuration; ZenohSettingsError says in one sentence why it cannot be used."""
+    """The session's configuration. ZenohSettingsError says in one sentence why it cannot be used."""
     config = zenoh.Config() if settings.config_file is None else _read(settings)
     usual = zenoh.Config()
     for key, value in _DEFAULTS.items():

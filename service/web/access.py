@@ -125,7 +125,7 @@ async def _refused(_request: Request, error: Exception) -> Response:
 
 
 async def _failed(request: Request, error: Exception) -> Response:
-    """The response to a request whose handler raised; uvicorn's own log of it is off."""
+    """The response to a request whose handler raised. uvicorn's own log of it is off."""
     _log.error("web.failed", path=request.url.path, why=repr(error), exc_info=error)
     return await _refused(request, HTTPException(HTTPStatus.INTERNAL_SERVER_ERROR, _FAILED))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page's requests: JSON over GET; writing a mission and fetching logs need the token.
+"""The page's requests: JSON over GET. Writing a mission and fetching logs need the token.
 
 docs/status-page.md, "For programs", describes them.
 """

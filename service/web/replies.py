@@ -31,7 +31,7 @@ def path_number(request: Request, name: str) -> int:
 
 
 def whole(text: str) -> int:
-    """A whole number in a request; refused if it is none."""
+    """A whole number in a request. Refused if it is none."""
     if not text.isascii() or not text.isdecimal() or len(text) > len(str(MOST)) or int(text) > MOST:
         raise HTTPException(HTTPStatus.NOT_FOUND, f"{text[:20]!r} is not a valid number.")
     return int(text)

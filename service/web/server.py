@@ -90,7 +90,7 @@ def _config(api: Api, settings: WebSettings, token: Token | TokenError) -> Confi
     routes = [*api.routes(), *(route("GET", *each) for each in _static_files())]
     app = Starlette(routes=routes, exception_handlers=EXCEPTION_HANDLERS)
     app.state.hosts, app.state.token = settings.hosts, token
-    # uvicorn would log only the errors of browsers; ours are logged by `failed`.
+    # uvicorn would log only the errors of browsers. Ours are logged by `failed`.
     open_app = CORSMiddleware(app, settings.origins, ("GET", "POST"), ("Authorization", "Content-Type"), max_age=600)
     return Config(
         SafeHeaders(open_app if settings.origins else app, settings.map_tiles.origin),

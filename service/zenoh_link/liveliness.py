@@ -59,7 +59,7 @@ class Liveliness:
         self._neighbours: set[str] = set()
 
     def declare(self, session: zenoh.Session, alive: str) -> None:
-        """Declare the token and find others; called on the session's thread. `alive`: the tokens' key prefix."""
+        """Declare the token and find others. Called on the session's thread. `alive`: the tokens' key prefix."""
         self._own = str(session.zid())
 
         def joined(event: zenoh.TransportEvent) -> None:

@@ -14,7 +14,7 @@ from service.zenoh_link.publisher import Publisher
 
 #: All subscribers are one peer: zenoh does not tell them apart.
 _READERS = Peer("zenoh", MAVLINK_OUT.suffix)
-#: More than a datagram of any link holds; larger samples are not MAVLink.
+#: More than a datagram of any link holds. Larger samples are not MAVLink.
 _MAX_BYTES = 2048
 #: Samples beyond this are dropped when they arrive faster than the event loop takes them.
 _MAX_WAITING = 64
@@ -33,7 +33,7 @@ class MavlinkLink:
         self._waiting = 0
 
     def declare_input(self, session: zenoh.Session, name: str) -> None:
-        """Take frames at the key `name`; called on the session's thread."""
+        """Take frames at the key `name`. Called on the session's thread."""
         session.declare_subscriber(name, zenoh.handlers.Callback(self._arrived, indirect=False))
 
     def read(self, *, is_read: bool) -> None:

@@ -85,7 +85,7 @@ class Node(Follower):
             self._outages = self._loop.create_task(log_outages(diagnose, lambda: self._presence.is_alone))
 
     async def close(self) -> None:
-        """Leave; takes at most a second."""
+        """Leave. Takes at most a second."""
         if self._tick is not None:
             self._tick.cancel()
         if self._outages is not None:

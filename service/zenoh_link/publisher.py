@@ -22,7 +22,7 @@ _LAST_NUMBER_S = 1.0
 class Publisher:
     """Publishes a vehicle's samples, and knows which keys have subscribers: telemetry without one is not even encoded.
 
-    Samples of kept keys are put in any case. A subscriber that was away, or joins late, asks the publisher for them;
+    Samples of kept keys are put in any case. A subscriber that was away, or joins late, asks the publisher for them.
     zenoh's AdvancedSubscriber does so by itself.
     """
 

@@ -16,7 +16,7 @@ from reports.vehicle_groups import Group
 _CHANGED_S = 5.0
 _IDLE_S = 30.0
 _OVERVIEW_S = 10.0
-#: The changes that count; noise does not, nor does a field that is not listed.
+#: The changes that count. Noise does not, nor does a field that is not listed.
 _CHANGES: Mapping[Group, Mapping[str, float]] = {
     Group.ATTITUDE: {"roll_deg": 2, "pitch_deg": 2, "heading_deg": 5},
     Group.POSITION: {"lat_deg": 2e-5, "lon_deg": 2e-5, "height_m": 1, "climb_m_s": 0.5, "home_lat_deg": 1e-7},

@@ -69,11 +69,11 @@ class SessionThread:
             self._wake.notify()
 
     def timestamp(self) -> zenoh.Timestamp | None:
-        """The time of the session's clock, for a reply; samples get theirs from zenoh."""
+        """The time of the session's clock, for a reply. Samples get theirs from zenoh."""
         return None if self._session is None else self._session.new_timestamp()
 
     def close(self) -> None:
-        """Close the session; waits for that only briefly."""
+        """Close the session. Waits for that only briefly."""
         with self._wake:
             self._is_closing = True
             self._wake.notify()

@@ -31,7 +31,7 @@ class SampleClock:
         return round(time.time() if self._epoch_s is None else self._epoch_s + self._now(), 3)
 
     def source(self, vehicle: Vehicle) -> str:
-        """Find out the source: gps (the flight controller has a fix and the time), ntp or pi; `unix_s` then uses it."""
+        """Find out the source: gps (the flight controller has a fix and the time), ntp or pi. `unix_s` then uses it."""
         gps_time, fix, now = vehicle.last(GpsTime), vehicle.last(GpsFix), self._now()
         if gps_time is not None and fix is not None and fix.fix is Fix.THREE_D:
             age_s = now - min(gps_time.heard_at, fix.heard_at)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits; power may fail during either."""
+"""NOR flash of an STM32F103: erasing sets a page to ones, programming clears bits. Power may fail during either."""
 
 from simulator.board.options import Faults
 

@@ -54,7 +54,7 @@ class Craft:
     acc: tuple[int, int, int] = LEVEL_ACC
 
     def way_home(self) -> tuple[float, float]:
-        """Distance in metres and direction in degrees; zeros without a home."""
+        """Distance in metres and direction in degrees, or zeros without a home."""
         if self.home is None:
             return 0.0, 0.0
         lat_e7, lon_e7 = self.home

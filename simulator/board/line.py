@@ -37,7 +37,7 @@ def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
 
 
 def disturb(data: bytes, lost_byte_rate: float, bit_error_rate: float, dice: random.Random) -> bytes:
-    """Drop bytes and flip bits; the rates are probabilities."""
+    """Drop bytes and flip bits. The rates are probabilities."""
     if not (data and (lost_byte_rate or bit_error_rate)):
         return data
     kept = (byte for byte in data if dice.random() >= lost_byte_rate) if lost_byte_rate else data

@@ -48,7 +48,7 @@ _ACKNOWLEDGED = frozenset(
 class MspReceiver:
     """Finds requests as the firmware does: it trusts a header's size and never rescans.
 
-    `buffer_size`: the largest payload; a larger size byte is refused. The stock firmware takes 64 and has no
+    `buffer_size`: the largest payload. A larger size byte is refused. The stock firmware takes 64 and has no
     timeout: after a truncated frame it consumes the next's bytes until its count is reached.
     """
 

@@ -57,7 +57,7 @@ class MspCommand(IntEnum):
 class SensorReplies:
     """`boxes`: the modes' names by permanent id, in the order of the status flags.
 
-    `sensors`: in STATUS; by default accelerometer, barometer, magnetometer and GPS.
+    `sensors`: in STATUS. By default accelerometer, barometer, magnetometer and GPS.
     `channels`: in RC. `heading_from`: headings begin at 0 or at -180. `fix_3d`: the code of a 3D fix in RAW_GPS.
     `currents_ca`: disarmed and armed, 0.01 A.
     """

@@ -20,7 +20,7 @@ _BANK_DEG, _NOSE_DOWN_DEG = 2.0, 8.0
 
 
 class WaypointCraft:
-    """Starts on its field. Metres, seconds, degrees; positions are degrees * 1e7."""
+    """Starts on its field. Metres, seconds, degrees. Positions are degrees * 1e7."""
 
     def __init__(self) -> None:
         self._north = self._east = 0.0

@@ -19,7 +19,7 @@ from simulator.links.tcp_link import SimTcpLink
 class RunOptions:
     """The board's connections and scheduled events. Times in seconds.
 
-    `link`: of a pseudo-terminal. `tcp`: host and port; one of them is set. `control`: a Unix socket.
+    `link`: of a pseudo-terminal. `tcp`: host and port. One of them is set. `control`: a Unix socket.
     """
 
     link: Path | None = None

@@ -111,7 +111,7 @@ class EmulatedNaze(SimulatedBoard):
     # -- controls --------------------------------------------------------------------------------------------
 
     def power_on_booted(self, now: float) -> None:
-        """Switch the power on and let the board boot at once; `on_boot` gets the progress, 0 to 1."""
+        """Switch the power on and let the board boot at once. `on_boot` gets the progress, 0 to 1."""
         super().power_on_booted(now)
         begun = now - self._boot_s
         while begun < now:

@@ -42,7 +42,7 @@ class Registers:
 
 
 class Bus:
-    """Passes accesses to the blocks; `others` are those without behaviour, by address."""
+    """Passes accesses to the blocks. `others` are those without behaviour, by address."""
 
     def __init__(self, rcc: Peripheral, flash_controller: Peripheral, others: Mapping[int, Peripheral]) -> None:
         blocks = {_RCC: rcc, _FLASH_CONTROLLER: flash_controller, **others}

@@ -33,7 +33,7 @@ _PER_VOLT = 4095 / 3.3 / 11
 class FlyingSwitches(EmulatedFaults):
     """The switches of a board in flight.
 
-    `radio` 0 is a transmitter switched off, `gps_fix` 0 a hidden sky, `gps` 0 a broken wire to the module; `volts`
+    `radio` 0 is a transmitter switched off, `gps_fix` 0 a hidden sky, `gps` 0 a broken wire to the module. `volts`
     other than 0 replaces the battery's.
     """
 

@@ -18,7 +18,7 @@ _SYMBOL = struct.Struct("<IIIBBH")
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """`program` begins at the flash's first byte; `symbols` are the addresses by name."""
+    """`program` begins at the flash's first byte. `symbols` are the addresses by name."""
 
     program: bytes
     symbols: dict[str, int] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from simulator.emulated_naze.register_chip import RegisterChip, word_byte
 ADDRESS = 0x68
 _MEASUREMENTS, _POWER, _IDENTITY = 0x3B, 0x6B, 0x75
 _RESET, _ASLEEP = 0x80, 0x40
-#: Level and still, 1 g at the range of 8 g; the gyroscope's zero has an offset.
+#: Level and still, 1 g at the range of 8 g. The gyroscope's zero has an offset.
 _STILL = (0, 0, 4096)
 #: 30.6 degrees C.
 TEMPERATURE = -2000
@@ -43,7 +43,7 @@ class Mpu6050(RegisterChip):
         return self._registers[number]
 
     def set(self, number: int, byte: int) -> None:
-        """Configure it; bit 7 of PWR_MGMT_1 is a reset."""
+        """Configure it. Bit 7 of PWR_MGMT_1 is a reset."""
         if number == _POWER and byte & _RESET:
             self._reset()
         else:

@@ -12,7 +12,7 @@ _PRESSURE_NOISE = 100
 
 
 class Ms5611:
-    """In still air; `noise` is added to the pressure."""
+    """In still air. `noise` is added to the pressure."""
 
     def __init__(self, noise: random.Random) -> None:
         self._noise = noise

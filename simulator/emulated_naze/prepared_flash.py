@@ -35,7 +35,7 @@ _ACC_S, _MAG_S = 18.0, 72.0
 
 
 def prepared_flash(image: Image, say: Callable[[str], None] = lambda _: None, lines: tuple[str, ...] = ()) -> bytes:
-    """The flash's contents, see `prepare`; `say` gets a sentence if it takes a while. ConsoleError."""
+    """The flash's contents, see `prepare`. `say` gets a sentence if it takes a while. ConsoleError."""
     recipe = repr((_SETUP, lines, _ACC_S, _MAG_S)).encode()
     path = cache_folder() / f"flash-{hashlib.sha256(image.program + recipe).hexdigest()[:16]}.img"
     if path.exists():

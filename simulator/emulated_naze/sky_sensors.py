@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The board's sensor chips in a simulated sky: registers and bytes for what `Sky` measures.
 
-Mounting on a Naze32: the MPU-6050's axes are forward, left, up; the HMC5883L's are back, right, up.
+Mounting on a Naze32: the MPU-6050's axes are forward, left, up. The HMC5883L's are back, right, up.
 """
 
 import random

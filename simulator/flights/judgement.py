@@ -77,7 +77,7 @@ class Extremes:
 
     @property
     def problem(self) -> str:
-        """What no flight may do, whatever the sensors say; "" if it did not."""
+        """What no flight may do, whatever the sensors say, or "" if it did not."""
         if self.has_crashed:
             return "crashed"
         if self.off_legs_m > _FLYAWAY_M or self.fastest > _FASTEST or self.steepest_deg > _STEEPEST_DEG:

@@ -20,7 +20,7 @@ from simulator.inav.places import PLACES_SIZE, InavPlaces, PartialReplyError
 from simulator.inav.settings import InavSettings
 
 _PLANE = 1
-_SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer; bit 15 would be a failure
+_SENSORS = 0b1000_1111  # accelerometer, barometer, compass, GPS, thermometer. Bit 15 would be a failure
 _PITOT = 1 << 6
 _CYCLE_TIME_US = 500
 _ARMED_FLAGS = 0b1100  # armed, and armed once
@@ -309,7 +309,7 @@ class InavFirmware(MspFirmware):
                 return self._navigation.status().pack()
         usual = self._settings.read(command) or _CONSTANT_REPLIES.get(command) or self._sensors.payload(command, craft)
         if command == MspCommand.RC and usual and self._clock < self._sticks_released_at:
-            # Roll and pitch; the throttle is low.
+            # Roll and pitch. The throttle is low.
             return struct.pack("<2H", _STICK_END_US, _STICK_END_US) + usual[4:]
         if command == MspCommand.RAW_GPS and usual is not None:
             return usual + struct.pack("<H", _HDOP_E2)

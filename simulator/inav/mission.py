@@ -22,7 +22,7 @@ FAKE = NavWaypoint()
 
 
 class InavMission:
-    """`eeprom`: EEPROM_SIZE bytes; blank ones are zeros, an invalid action for INAV."""
+    """`eeprom`: EEPROM_SIZE bytes. Blank ones are zeros, an invalid action for INAV."""
 
     def __init__(self, eeprom: memoryview) -> None:
         self._eeprom = eeprom
@@ -123,7 +123,7 @@ class InavMission:
         self.count = ends[self.selected - 1] + 1 - self._start if len(ends) >= self.selected else 0
 
     def is_flyable(self) -> bool:
-        """True if INAV allows arming with these JUMPs; checked whenever it is disarmed. CrashError."""
+        """True if INAV allows arming with these JUMPs. Checked whenever it is disarmed. CrashError."""
         if not self.had_jumps:
             return True
         for index in range(self.count):

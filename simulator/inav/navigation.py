@@ -76,7 +76,7 @@ class InavNavigation:
 
     @property
     def is_in_mission(self) -> bool:
-        """True if the flight mode is NAV WP; during a mission's RTH it is NAV RTH."""
+        """True if the flight mode is NAV WP. During a mission's RTH it is NAV RTH."""
         return self.phase not in (Phase.IDLE, Phase.ZONE_HOLD) and not self.is_returning
 
     @property

@@ -51,7 +51,7 @@ class PartialReplyError(Exception):
 
 
 class InavPlaces:
-    """`stored`: PLACES_SIZE bytes of the EEPROM; the first one is set once they were saved."""
+    """`stored`: PLACES_SIZE bytes of the EEPROM. The first one is set once they were saved."""
 
     def __init__(self, stored: memoryview, version: tuple[int, ...]) -> None:
         self._stored = stored
@@ -70,7 +70,7 @@ class InavPlaces:
         self._vertices_in_force = [_VERTEX.unpack(vertex) for vertex in self._vertices if vertex != _FREE]
 
     def waypoint_set(self, number: int, *, is_last: bool) -> None:
-        """SET_WP erases the approach of a mission, counted from the boot; past the last approach it erases all."""
+        """SET_WP erases the approach of a mission, counted from the boot. Past the last approach it erases all."""
         self._missions = 0 if number == 0 else (self._missions + is_last) % 256
         erased = (_SAFEHOMES + self._missions) % 256
         numbers = (erased,) if erased < _APPROACHES else range(_APPROACHES)
@@ -164,7 +164,7 @@ class InavPlaces:
         return not inside and any(self._distance_m(number, position) <= _IGNORED_M for number in inclusive)
 
     def action_ahead(self, here: tuple[int, int], target: tuple[int, int]) -> int:
-        """The action of the first zone whose border is within 150 m on the way to a place; 0: none is."""
+        """The action of the first zone whose border is within 150 m on the way to a place, or 0 if none is."""
         active = [(number, _ZONE.unpack(zone)) for number, zone in enumerate(self._zones_in_force)]
         active = [(number, zone) for number, zone in active if zone[6] and zone[5]]
         metres = _metres(here, target)

@@ -109,7 +109,7 @@ class InavSettings:
         return settings[index] if index < len(settings) else None, data[2:]
 
     def _set(self, setting: InavSetting, data: bytes) -> bool:
-        """An unsigned value below the minimum is accepted; bytes after the value are ignored."""
+        """An unsigned value below the minimum is accepted. Bytes after the value are ignored."""
         value = decode_value(setting.type, data)
         if value is None:
             return False

@@ -83,7 +83,7 @@ class MultiWiiFirmware(MspFirmware):
         return kept | self.armed << _ARM | (mode is Mode.RTH) << _RETURN | (mode is Mode.NAV) << _MISSION
 
     def answer(self, command: int, payload: bytes, now: float) -> bytes | None:
-        """The reply frame; none for a waypoint while a mission is flown."""
+        """The reply frame, or none for a waypoint while a mission is flown."""
         self._fly_until(now)
         match command:
             case MspCommand.SET_WP:

@@ -37,7 +37,7 @@ class MultiWiiMission:
     def recall(self, number: int) -> tuple[int, NavWaypoint, bool]:
         """A waypoint with the number in its slot, and True if the checksum is valid.
 
-        Above the capacity are the EEPROM's other contents; here it is erased.
+        Above the capacity are the EEPROM's other contents. Here it is erased.
         """
         slot = self._slot(number) if number <= self._capacity else _ERASED
         return *unpack_waypoint(slot[:-1]), _is_sound(slot)

@@ -68,7 +68,7 @@ _AUTOSENSE, _MSP, _MAVLINK = Protocol
 
 
 class Firmware:
-    """Runs one main loop at a time; idle loops may be skipped."""
+    """Runs one main loop at a time. Idle loops may be skipped."""
 
     def __init__(
         self,

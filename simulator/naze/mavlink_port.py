@@ -30,7 +30,7 @@ _SENSORS = 35843 | 4100 | 8200 | 16416
 _SENSORS_HEALTHY = _SENSORS & 1023
 _RSSI = 230
 
-#: The stream has slots of 10 ms; a message is sent in each slot whose number its divisor divides, one per slot.
+#: The stream has slots of 10 ms. A message is sent in each slot whose number its divisor divides, one per slot.
 SLOT_SECONDS = 0.010
 
 

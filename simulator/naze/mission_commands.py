@@ -72,7 +72,7 @@ class MissionCommands:
         return None
 
     def drop_stale(self, now: float) -> None:
-        """Drop an open transfer if the craft is armed or at the timeout; add to the write budget."""
+        """Drop an open transfer if the craft is armed or at the timeout. Add to the write budget."""
         intervals = int(now * 1000) // _WRITE_INTERVAL_MS
         self._writes_left = min(self._writes_left + intervals - self._intervals, _WRITE_BURST)
         self._intervals = intervals
@@ -132,7 +132,7 @@ class MissionCommands:
         return False
 
     def _progress(self, status: ReplyStatus) -> Staged:
-        """The progress of the transfer, with `status`; zeros without one."""
+        """The progress of the transfer, with `status`, or zeros without one."""
         staged = self._transfer.next if self._transfer else 0
         return Staged(status, staged, self._slots.staged_checksum(staged))
 

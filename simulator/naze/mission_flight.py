@@ -12,7 +12,7 @@ _CURRENT_EVERY, _REACHED_EVERY, _SUMMARY_EVERY = 97, 7, 37
 
 
 class MissionFlight:
-    """Answers FLIGHT and makes the messages of the MAVLink stream; does neither without `Faults.flight`."""
+    """Answers FLIGHT and makes the messages of the MAVLink stream. Does neither without `Faults.flight`."""
 
     def __init__(self, faults: Faults) -> None:
         self._faults = faults

@@ -183,7 +183,7 @@ class StoredConfig:
         self._program(self._place, wp_radius_cm, settings, _CONFIG_SEAL if sealed else _NO_SEAL, self._seconds)
 
     def load_settings(self, size: int) -> bytes:
-        """The settings' bytes; none if the place has none."""
+        """The settings' bytes, or none if the place has none."""
         has_settings = self.is_valid and self._settings(self._place)
         return self._flash.read((self._place + 1) * PAGE_SIZE - _CONFIG.size - size, size) if has_settings else b""
 

@@ -62,7 +62,7 @@ class OwnMissionStore:
         self.load()
         self._receiving = self._sending = self._knows_roi = False
         self._total = self._expected = 0
-        #: With the extension, the last item of the upload that was accepted last; 0: none.
+        #: With the extension, the last item of the upload that was accepted last, or 0 if there is none.
         self._last_accepted = 0
         self._touched = 0.0
 

@@ -3,5 +3,5 @@
 
 World axes: x north, y west, z up, metres from the launch place. Body axes: x forward, y left, z up. Everything is
 seeded, and time is passed in. Sources: Stevens, Lewis, Johnson, "Aircraft Control and Simulation", 3rd edition (rigid
-body, quaternions); each sensor's data sheet.
+body, quaternions). Each sensor's data sheet.
 """

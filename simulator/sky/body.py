@@ -24,9 +24,9 @@ class Airframe:
     inertia: Vector = (0.011, 0.011, 0.021)
     #: The distance of each motor from the roll and the pitch axis.
     arm: float = 0.16
-    #: One motor's thrust at full throttle, N; a quarter of the weight is reached near half throttle.
+    #: One motor's thrust at full throttle, N. A quarter of the weight is reached near half throttle.
     full_thrust: float = 7.6
-    #: The part of the thrust that grows linearly with the pulse; the rest grows with its square.
+    #: The part of the thrust that grows linearly with the pulse. The rest grows with its square.
     linear: float = 0.3
     #: A propeller's reaction torque for each newton of thrust, m.
     torque: float = 0.016

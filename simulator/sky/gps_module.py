@@ -100,7 +100,7 @@ class GpsModule:
             self._pending.append(self._measure(now_s, position, velocity))
 
     def take(self, now_s: float, board_baud: int) -> bytes:
-        """The bytes it sends now; b"" if there is nothing new, or the board listens at another speed."""
+        """The bytes it sends now, or b"" if there is nothing new, or the board listens at another speed."""
         sent = b""
         while self._pending and self._pending[0].at_s + self._lies.gps_lag <= now_s:
             measurement = self._pending.popleft()

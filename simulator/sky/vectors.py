@@ -4,7 +4,7 @@
 from math import atan2, cos, degrees, sin, sqrt
 
 Vector = tuple[float, float, float]
-#: w, x, y, z; rotates body axes to world axes.
+#: w, x, y, z. Rotates body axes to world axes.
 Quaternion = tuple[float, float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)

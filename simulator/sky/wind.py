@@ -29,7 +29,7 @@ class Wind:
         self._is_calm = not speed
 
     def at(self, now_s: float) -> Vector:
-        """The air's velocity, world axes; times must not go back."""
+        """The air's velocity, world axes. Times must not go back."""
         if self._is_calm or now_s < self._next_s:
             return self._now
         self._next_s = now_s + _STEP_S

@@ -327,7 +327,7 @@ class HarakiriCheck(ListCheck):
         return lowest_m
 
     def _refuse_kept_list(self) -> RejectingFinding | None:
-        """Apply the rules for `last` and `alone` to the kept list; dropping items does not change first and last."""
+        """Apply the rules for `last` and `alone` to the kept list. Dropping items does not change first and last."""
         last, last_rule = self._kept[-1]
         if last_rule.place is InList.NOT_LAST:
             return reject(MissionResult.INVALID, last, "command", f"{last_rule.name} would be last: rest dropped")

@@ -60,7 +60,7 @@ _LOOK_S = 0.4
 #: Losses in a row without progress before a push is given up.
 _MAX_WASTED = 20
 
-#: The failure reported if this status ends the last attempt; any other becomes "the line is bad".
+#: The failure reported if this status ends the last attempt. Any other becomes "the line is bad".
 _FAILURES = {
     ReplyStatus.ARMED: PushFailure.ARMED,
     ReplyStatus.BUSY: PushFailure.BUSY,
@@ -120,7 +120,7 @@ class HarakiriMissions(_HarakiriStore):
         return FlightLimits(first_m, height_m, radius_m)
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
-        """Write the list: BEGIN, CHUNKs, COMMIT; verified by the checksum over the flash."""
+        """Write the list: BEGIN, CHUNKs, COMMIT. Verified by the checksum over the flash."""
         packed = pack_records(records)
         wanted = ListIdentity(len(records), crc32(packed))
         failure = PushFailure.NO_ANSWER
@@ -257,7 +257,7 @@ class HarakiriMissions(_HarakiriStore):
 
 
 def _confirmed(packed: bytes, answer: Staged) -> int:
-    """The number of correct records on the flight controller; restarts if it has other ones."""
+    """The number of correct records on the flight controller. Restarts if it has other ones."""
     size = answer.next * RECORD_SIZE
     if size > len(packed) or crc32(packed[:size]) != answer.checksum:
         raise PushFailed(PushFailure.NO_ANSWER, is_final=False)

@@ -34,7 +34,7 @@ _OWN_BOX = "GTUNE"
 #: Its own axes are left, forward and up (imu.c).
 _ACC_AXES = ((1, 1), (0, -1), (2, -1))
 _THROTTLE = 2
-#: The highest value of rc_minchk, below which the throttle must be; the default is 1100.
+#: The highest value of rc_minchk, below which the throttle must be. The default is 1100.
 _SURELY_NOT_LOW_US = 1250
 
 

@@ -24,10 +24,10 @@ MAV_COMMANDS: Mapping[int, Command] = {
 _UNKNOWN_COMMAND = 0
 _NONE_KNOWN: Mapping[int, int] = MappingProxyType({})
 
-#: The capacity with default settings; patched boards report theirs.
+#: The capacity with default settings. Patched boards report theirs.
 USUAL_CAPACITY = 146
 USUAL_WP_RADIUS_CM = 200
-#: The user manual's limit; the firmware itself would take 255.
+#: The user manual's limit. The firmware itself would take 255.
 TAKEOFF_MAX_M = 15
 _MAX_RADIUS_M = 255
 
@@ -53,7 +53,7 @@ CRUISE = Range(-32767, 32767, "-32767..32767 m", instead_of_zero=2)
 class CommandRule:
     """One row: the storable fields of one command. param3 is 0 for every command.
 
-    position: required, else the item is dropped; if False, latitude and longitude are stored as 0.
+    position: required, else the item is dropped. If False, latitude and longitude are stored as 0.
     alone: False if the mission needs another command besides this one (and ROIs).
     """
 
@@ -73,7 +73,7 @@ class CommandRule:
 
 
 def command_rules(wp_radius_cm: int, takeoff_max_m: int) -> Mapping[int, CommandRule]:
-    """The table: MAV_CMD number to rule; a command without a rule cannot be stored.
+    """The table: MAV_CMD number to rule. A command without a rule cannot be stored.
 
     gps_wp_radius is rounded up to whole metres, so that no stored radius is smaller than it.
     """

@@ -56,7 +56,7 @@ _CRASHES = "a running Harakiri can crash with another one; set it on its command
 _FIXED = dict.fromkeys(
     ("gbl_flg", *(f"align_{sensor}_{axis}" for sensor in ("gyro", "acc", "mag") for axis in "xyz")), _CRASHES
 )
-#: The units of the settings, as the firmware documents them; the others have none.
+#: The units of the settings, as the firmware documents them. The others have none.
 _UNITS = {
     name: unit
     for unit, names in {
@@ -170,7 +170,7 @@ class HarakiriFcSettings(FcSettings):
 def read_by_name(places: dict[str, int], *names: str) -> Conversation[list[float] | None]:
     """The values of these settings, or None if it lacks one, does not answer, or is armed.
 
-    `places`: of the settings found so far, which this fills; new settings are at the table's end.
+    `places`: of the settings found so far, which this fills. New settings are at the table's end.
     """
     if not places:
         whole = yield from _whole()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV: the list is only in RAM until SAVE; an incomplete list cannot be flown (docs/inav.md).
+"""INAV: the list is only in RAM until SAVE. An incomplete list cannot be flown (docs/inav.md).
 
-The store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read;
-armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
+The store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read.
+Armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ class InavMissions(NavMissions, FliesToItems):
     _seen: tuple[NavInfo, int] | None = None
     #: The same, as of the last check for changes.
     _last_look: tuple[NavInfo, int] | None = None
-    #: The board's own settings about missions, as last read; they may have changed since if they are doubtful.
+    #: The board's own settings about missions, as last read. They may have changed since if they are doubtful.
     _limits: InavLimits | None = None
     _are_limits_doubtful = True
     #: A board that does not answer about them is asked again only at the next upload.
@@ -125,7 +125,7 @@ class InavMissions(NavMissions, FliesToItems):
     def is_current(self) -> Conversation[bool]:
         """Read GETINFO, the selection and some records of all missions: the sticks or another client may change them.
 
-        A list that is incomplete, with another size each time, is still being written; once it is complete, it is read.
+        A list that is incomplete, with another size each time, is still being written. Once it is complete, it is read.
         """
         if not self._are_limits_silent:
             yield from self._read_limits()
@@ -303,7 +303,7 @@ class InavMissions(NavMissions, FliesToItems):
 
 
 def _split(records: Sequence[NavRecord]) -> list[Mission]:
-    """The missions in a store; records after the last flag belong to none."""
+    """The missions in a store. Records after the last flag belong to none."""
     missions: list[Mission] = []
     start = 0
     for end, record in enumerate(records, 1):

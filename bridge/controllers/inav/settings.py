@@ -30,9 +30,9 @@ from protocols.msp.inav_settings import (
 )
 from protocols.msp.settings import RANGES
 
-#: The usual size; its ring also holds the few replies with many names of values.
+#: The usual size. Its ring also holds the few replies with many names of values.
 _REPLY_SIZE = 160
-#: INAV has about 650; a board that never ends the table must not be asked for ever.
+#: INAV has about 650. A board that never ends the table must not be asked for ever.
 _MOST = 2000
 _TRIES = 3
 #: PIDs, modes, rates and MISC. With EZ Tune on (the first byte), each reading of the PIDs lets INAV compute them again.

@@ -94,7 +94,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return (replace(items[0], lat_e7=home[0], lon_e7=home[1]), *items[1:])
 
     def seq_of(self, records: Sequence[NavRecord], number: int) -> int:
-        """The seq of the item for record `number`; 0: none."""
+        """The seq of the item for record `number`, or 0 if there is none."""
         return item_seqs(records)[number - 1] if 1 <= number <= len(records) else 0
 
     def push(self, records: tuple[NavRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
@@ -143,7 +143,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
 
     @abstractmethod
     def _keep(self) -> Conversation[None]:
-        """Make the list permanent after the last record; raises PushFailed."""
+        """Make the list permanent after the last record. Raises PushFailed."""
 
     def _store_content(self, records: tuple[NavRecord, ...]) -> tuple[NavRecord, ...]:
         """All records to write so that `records` are flown, and nothing else is lost."""
@@ -196,7 +196,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         yield from self._prove(len(wanted))
 
     def _prove(self, count: int) -> Conversation[None]:
-        """Verify what single records do not show; raises PushFailed."""
+        """Verify what single records do not show. Raises PushFailed."""
         yield from ()
 
     def _compare(self, number: int, record: NavRecord) -> Conversation[None]:
@@ -210,7 +210,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         raise PushFailed(PushFailure.REFUSED, is_final=False)
 
     def read(self, number: int) -> Conversation[NavRecord | None]:
-        """Read one record; ignores replies about other ones (telemetry polls home)."""
+        """Read one record. Ignores replies about other ones (telemetry polls home)."""
         for _ in range(_TRIES):
             asked: Send | None = send(encode_read_wp(number), Nav.WP, WP_SIZE)
             while True:

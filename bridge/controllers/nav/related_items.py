@@ -33,7 +33,7 @@ class Jumps:
     wanted: list[tuple[int, MissionItem]] = field(default_factory=list)
 
     def aim(self, records: list[NavRecord], note: Note) -> RejectingFinding | None:
-        """Set the target of each JUMP in `records`; rejects one that the flight controller would not fly."""
+        """Set the target of each JUMP in `records`. Rejects one that the flight controller would not fly."""
         for place, item in self.wanted:
             wanted = int(item.p1)
             target = self.places[wanted]

@@ -25,7 +25,7 @@ class NavProfile:
 
     capacity: records, without home. endless_hold: action and p1 of an endless hold. sea_level: altitudes may refer to
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
-    must go back, and no other may be in its loop; if False, it may go to any leg that is not adjacent. longest_hold: s.
+    must go back, and no other may be in its loop. If False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
     decides if it lands, else the last record's p1 does. limits: its own settings; None: unknown.
     """
@@ -65,7 +65,7 @@ REPEATS = Range(-1, 32767, "repeats -1..32767")
 
 @dataclass(frozen=True, slots=True)
 class NavRule:
-    """One row. p1: the range of the first parameter. position: required; if False, none is kept."""
+    """One row. p1: the range of the first parameter. position: required. If False, none is kept."""
 
     action: NavAction
     p1: Range

@@ -9,7 +9,7 @@ from protocols.msp.nav import FLY_HOME, LEGS, NavAction, NavRecord
 from protocols.msp.nav_items import HIGHEST_HEADING, leg_speed
 
 _ABOVE_SEA = 1
-#: The fields of a record that items do not show, by the action; of these, only a LAND's p2 changes a flight.
+#: The fields of a record that items do not show, by the action. Of these, only a LAND's p2 changes a flight.
 _HIDDEN: Mapping[int, tuple[str, ...]] = {
     NavAction.WAYPOINT: ("p2",),
     NavAction.POSHOLD_UNLIM: ("p1", "p2"),

@@ -106,7 +106,7 @@ class Port:
     def mavlink_of(self, frame: MavlinkFrame) -> Spoken:
         """A Harakiri's MAVLink or another autopilot's.
 
-        A board met over MSP stays in its family unless it sends MAVLink 2; otherwise the sender decides.
+        A board met over MSP stays in its family unless it sends MAVLink 2. Otherwise the sender decides.
         """
         if self.autopilot is not Autopilot.AUTO:
             return Spoken.MAVLINK if self.autopilot is Autopilot.HARAKIRI else Spoken.OTHER_MAVLINK

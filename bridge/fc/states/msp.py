@@ -17,7 +17,7 @@ from protocols.msp.frame import MspFrame
 _FOREIGN_SILENCE_S = 0.5
 _BYTES_BEFORE_CHANGE = 300
 _FOREIGN_SIZE = 16
-#: Identification must be done by then; on a line at 1200 baud it takes 8 s.
+#: Identification must be done by then. On a line at 1200 baud it takes 8 s.
 _IDENTIFY_TIMEOUT_S = 15.0
 #: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
 _ARMED_SPEEDS = (57600, FRSKY_SPEED)

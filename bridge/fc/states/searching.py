@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the protocol and speed of a serial port. Sans-IO.
 
-A disarmed Harakiri sends MAVLink heartbeats until it receives something, and answers both protocols; armed, it may
+A disarmed Harakiri sends MAVLink heartbeats until it receives something, and answers both protocols. Armed, it may
 speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
 Each visit to a speed first only listens, then probes as well. An MSP reply is confirmed by a second one. Evidence is
-two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender; noise
+two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender. Noise
 produces none of them (test_autosense_noise.py). A board that echoes our probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
 test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.

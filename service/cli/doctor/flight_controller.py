@@ -36,7 +36,7 @@ def check_flight_controller(
 ) -> list[Checked]:
     """Find the flight controller, and the troubles that its line and its stations have.
 
-    `running`: a daemon's status; `ask_port` returns one or raises ControlError. `source`: where `fc` is set.
+    `running`: a daemon's status. `ask_port` returns one or raises ControlError. `source`: where `fc` is set.
     `mini_uart_config`: the path of config.txt if the port is the mini-UART.
     """
     better = f"printf '\\n[all]\\ndtoverlay=disable-bt\\n' | sudo tee -a {mini_uart_config} && sudo reboot"

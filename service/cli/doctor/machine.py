@@ -22,7 +22,7 @@ from storage.database import kept_aside, read_database
 from storage.store_error import StoreError
 
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
-#: A Pi without a clock starts in 1970, or at the last shutdown; no release is older than this.
+#: A Pi without a clock starts in 1970, or at the last shutdown. No release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
 _SET_CLOCK = "sudo date --set 'YEAR-MONTH-DAY HOUR:MINUTE', with the present time"
 _LEAST_FREE = 64 << 20

@@ -79,7 +79,7 @@ def answer(
     name: str = "",
     new_key: bool = False,
 ) -> Json:
-    """The answers to setup's questions; those not given stay. `is_trial`: only show the changes."""
+    """The answers to setup's questions. Those not given stay. `is_trial`: only show the changes."""
     if bool(hotspot) != bool(password):
         raise HelperRefusal("A hotspot needs a name and a password.")
     check_answers(hotspot or None, password or None, country or None, name or None)

@@ -72,7 +72,7 @@ class Step:
 
 
 class Machine:
-    """Makes changes; SetupError names the one that failed, and the reason."""
+    """Makes changes. SetupError names the one that failed, and the reason."""
 
     def __init__(self, host: Host) -> None:
         self._host = host

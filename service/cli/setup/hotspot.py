@@ -20,7 +20,7 @@ from service.machine.host import Host
 CONNECTION = "naze-bridge-hotspot"
 HOTSPOT_FILE = f"/etc/NetworkManager/system-connections/{CONNECTION}.nmconnection"
 ADDRESS = "10.42.0.1"
-#: For the name server of connections that NetworkManager shares; read when the hotspot opens.
+#: For the name server of connections that NetworkManager shares. Read when the hotspot opens.
 CAPTIVE_FILE = "/etc/NetworkManager/dnsmasq-shared.d/naze-bridge-captive.conf"
 _CAPTIVE_SOCKET = "naze-bridge-captive.socket"
 JOIN_S = 180
