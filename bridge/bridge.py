@@ -61,7 +61,7 @@ class Counters:
     """Counted since the start. Those of the flight controller since it was found, None without MSP."""
 
     ground_stations: int
-    #: Frames of ground stations: damaged ones, and refused ones, by link and reason.
+    #: Frames of ground stations: damaged and refused, by link and reason.
     bad_frames: int
     refused: Mapping[tuple[str, str], int]
     #: Requests of programs on a share, by reason.
@@ -292,7 +292,7 @@ class Bridge:
     # For metrics, the status and other followers.
 
     def watch(self, groups: Iterable[Group]) -> None:
-        """Poll for these groups from now on, and have the updated ones published."""
+        """Poll for these groups from now on, and have those updated published."""
         self._has_line_changed = True
         self._reporter.watch(groups)
 

@@ -120,7 +120,7 @@ class FleetFolder:
         (self.path / f"{name}.json5").unlink(missing_ok=True)
 
     def _load(self) -> tuple[dict[str, Member], FleetRouter | None]:
-        """The members by name, including expelled ones, and the router; none of both in a new folder."""
+        """The members by name, including those expelled, and the router; none of both in a new folder."""
         try:
             found = json.loads(self._read(_MEMBERS) or '{"members": {}, "router": null}')
             router = found["router"]
@@ -139,7 +139,7 @@ class FleetFolder:
         self._write(_ROUTER, self._router_config(members, router), 0o644)
 
     def _router_config(self, members: Mapping[str, Member], router: FleetRouter) -> Json:
-        """Rules for each vehicle, nothing for unknown sessions."""
+        """Rules for each vehicle, no rules for unknown sessions."""
         scheme = router.endpoint.partition("/")[0]
         port = router.endpoint.rpartition(":")[2]
         files = {"listen_certificate": "router.pem", "listen_private_key": "router.key"}
@@ -176,7 +176,7 @@ class FleetFolder:
         return session | {"transport": {"auth": {"usrpwd": {"user": name, "password": self._password(name)}}}}
 
     def _password(self, name: str) -> str:
-        """The member's password. A new member gets a new one."""
+        """The member's password. A new member gets a new password."""
         known = self._passwords()
         if name not in known:
             known[name] = secrets.token_urlsafe(18)

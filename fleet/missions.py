@@ -34,7 +34,7 @@ def pull(session: zenoh.Session, prefix: str, names: Collection[str], bridges: C
     """Read the missions. One result per vehicle, in the order of `names`. Replies of storages are ignored."""
     meant = [bridge for bridge in bridges if bridge.vehicle in names]
     used = Counter(bridge.vehicle for bridge in meant)
-    # One query to all takes no longer than one to the slowest.
+    # One query to all takes no longer than a query to the slowest.
     only = next(iter(names)) if len(names) == 1 else "*"
     replies = replies_of(session, full(prefix, only, MISSION_CURRENT.suffix), meant, _TIMEOUT_S)
     held = {bridge.vehicle: _held(bridge.vehicle, data) for bridge, data in replies.items()}

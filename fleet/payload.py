@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Payloads received over zenoh, as plain data that is safe to print.
 
-They may come from any program, so nothing here raises: a value that is missing or of another type is None.
+They may come from any program, so these functions do not raise: a value that is missing or of another type is None.
 """
 
 from typing import Any

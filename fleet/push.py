@@ -60,7 +60,7 @@ class FleetPush:
 
     @property
     def left_out(self) -> list[PushState]:
-        """The vehicles that nothing was sent to, because another had failed."""
+        """The vehicles that were not sent to, because another had failed."""
         return [each for each in self.vehicles.values() if each.is_left_out]
 
     def begin(self, names: Iterable[str], *, staged: bool) -> Iterator[str]:
@@ -118,7 +118,7 @@ def push(
 ) -> None:
     """Send the file to all and wait until each is done. `show` is called after every change.
 
-    `staged`: one vehicle first, then each time as many as have it. After a failure no other one is started.
+    `staged`: one vehicle first, then each time as many as have it. After a failure no other push is started.
     """
     show(fleet)
     for stage in stages(fleet.waiting) if staged else [fleet.waiting]:

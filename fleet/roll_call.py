@@ -83,7 +83,7 @@ def replies_of(
 
 
 def chosen(bridges: set[BridgeId], names: tuple[str, ...], prefix: str) -> list[str]:
-    """The names to use: the given ones, or all. Raises FleetError if one is not alive."""
+    """The names to use: those given, or all. Raises FleetError if one is not alive."""
     there = sorted({bridge.vehicle for bridge in bridges}, key=in_order)
     if not there:
         raise FleetError(f"no vehicle is alive under {prefix!r}: is naze-bridge running there, with this prefix?")

@@ -127,7 +127,7 @@ class Watch:
             self.overview(reply.ok)
 
     def look(self) -> list[tuple[FleetVehicle, float | None]]:
-        """The bridges that are alive, by name, and the age of each one's newest values; None: it was not heard yet."""
+        """The bridges that are alive, by name, and the age of their newest values, or None if not heard yet."""
         while self._arrived:
             take, arrived = self._arrived.popleft()
             take(arrived)

@@ -50,7 +50,7 @@ class ScreenRow:
 
     @property
     def problem(self) -> str:
-        """The reason why it needs attention, or empty if it does not, or if nothing was heard of it."""
+        """The reason why it needs attention, or empty if it does not, or if it was not heard."""
         if self.vehicle.bridges > 1:
             return f"{self.vehicle.bridges} bridges use this name"
         if not self.is_heard:

@@ -84,7 +84,7 @@ def mission_items(data: object) -> list[MissionItem]:
 
 
 def mission_findings(data: object) -> list[Finding]:
-    """The findings in a verdict or a stored mission, from any release: older ones lack `news`.
+    """The findings in a verdict or a stored mission, from any release: older releases lack `news`.
 
     Fields of another type count as missing, and the texts are safe to print.
     """

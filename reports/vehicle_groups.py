@@ -162,7 +162,7 @@ class SettingsIdentity:
 
 @dataclass(frozen=True, slots=True)
 class LastHeard:
-    """The values to find a silent craft by: the last known ones, however old."""
+    """The values to find a silent craft by: the last known values, however old."""
 
     armed: bool | None = None
     armed_age_s: Annotated[float | None, "seconds since it was heard"] = None

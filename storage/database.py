@@ -2,8 +2,8 @@
 """Open the database file: check its integrity, make commits durable, create its tables.
 
 Every start checks for damage, because SD cards decay and lose power. A damaged file is neither repaired
-nor deleted: it is renamed so that `sqlite3` can still open it, and a new one takes its place. SQLite detects damaged
-page structures, but not a changed byte in a value: so every row has a checksum.
+nor deleted: it is renamed so that `sqlite3` can still open it, and a new database takes its place. SQLite detects
+damaged page structures, but not a changed byte in a value: so every row has a checksum.
 """
 
 import re

@@ -123,7 +123,7 @@ class MissionStore:
         """Store a mission with the outcome PENDING. Returns its number, which increases with every mission.
 
         sender: the ground station that counts the items as in this list, see item_numbers().
-        A full store drops others first: rejected and cancelled ones before the rest, verified ones last.
+        A full store drops others first: rejected and cancelled lists before the rest, verified lists last.
         """
         values = {name: getattr(received, name) for name in CONTENTS}
         contents = {name: each if isinstance(each, bytes) else json.dumps(each) for name, each in values.items()}
@@ -277,7 +277,7 @@ class MissionStore:
 
 @dataclass(frozen=True, slots=True)
 class OpenedStore:
-    """A store ready for use. `set_aside`: the path of a damaged one. `salvaged`: the missions recovered from it."""
+    """A store ready for use. `set_aside`: the path of a damaged store. `salvaged`: the missions recovered from it."""
 
     store: MissionStore
     set_aside: Path | None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies intact missions and backups of settings from a damaged store into a new one.
+"""Copies intact missions and backups of settings from a damaged store into a new store.
 
 A mission is intact if both its rows match their checksums. Rows are looked up by number, so a damaged page loses
 only the rows on it.

@@ -11,7 +11,7 @@ from pathlib import Path
 from storage.database import BACKUP, insert, row_crc32, transaction
 from storage.store_error import StoreError, explained
 
-#: The newest ones are kept. 500 settings are 15 kB.
+#: The newest are kept. 500 settings are 15 kB.
 _MOST_OF_BOARD = 50
 _MOST = 300
 DAMAGED = "DAMAGED"
@@ -52,9 +52,9 @@ class SettingsBackups:
         self._path = path
 
     def add(self, board: str, kind: str, values: SettingValues, taken_at: float, occasion: str) -> int:
-        """Store a table of settings, and drop the oldest ones; returns its number.
+        """Store a table of settings, and drop the oldest; returns its number.
 
-        A table equal to the board's last one is not stored again: returns the number of that one.
+        A table equal to the board's last backup is not stored again: returns the number of that backup.
         """
         last = self._last(board, kind)
         changed = None if last is None else _changed_count(last.values, values)
@@ -102,7 +102,7 @@ class SettingsBackups:
         return self._newest("TRUE")
 
     def before(self, backup: BackupLine) -> int | None:
-        """The number of the same board's backup before this one, or None if there is none."""
+        """The number of the same board's backup before, or None if there is none."""
         return self._newest("board = ? AND kind = ? AND number < ?", backup.board, backup.kind, backup.number)
 
     def list(self, limit: int) -> builtins.list[BackupLine]:
@@ -123,7 +123,7 @@ class SettingsBackups:
         ]
 
     def _last(self, board: str, kind: str) -> SettingsBackup | None:
-        """The board's last backup; None if there is none or it is damaged: the next one is then stored in any case."""
+        """The board's last backup; None if there is none or it is damaged: the next is then stored in any case."""
         number = self._newest("board = ? AND kind = ?", board, kind)
         try:
             return None if number is None else self.get(number)

@@ -51,7 +51,7 @@ def assumed_home(items: Sequence[MissionItem], name: str) -> tuple[int, int] | N
 
 
 def write_file(path: Path, text: str, failure: type[FileError]) -> None:
-    """Write a file in one step: a full disk must not destroy the old one. `failure` if that fails.
+    """Write a file in one step: a full disk must not destroy the old file. `failure` if that fails.
 
     A link stays a link, and only regular files are replaced: as root, renaming over a device would destroy it.
     """

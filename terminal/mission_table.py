@@ -19,7 +19,7 @@ _DROPPED = "red"
 _ADDED = "green"
 #: Names of stored commands are never shortened.
 _LONGEST_STORED = len("RETURN_TO_LAUNCH")
-#: Longer ones (coordinates, commands) take two lines, so that the table fits 80 columns.
+#: Longer values (coordinates, commands) take two lines, so that the table fits 80 columns.
 _LONGEST_PAIR = 8
 
 
@@ -31,7 +31,7 @@ def mission_table(
 ) -> Table:
     """One row per item sent, with "sent->stored" for each changed value or item number, and one per inserted item.
 
-    `stored` is the list as it reads back, empty for a rejected or cleared one. `findings` name the items missing in it,
+    `stored` is the list as it reads back, empty for a rejected or cleared list. `findings` name the missing items,
     and are printed below the table with their reasons, except filled-in defaults. `sent_seqs`: see Verdict.
     """
     reasons = Text("".join(f"\n{text}" for text in correction_texts(findings)))

@@ -125,7 +125,7 @@ class MultiwiiMissions(NavMissions):
         return result
 
     def pull(self) -> Conversation[tuple[NavRecord, ...] | None]:
-        """Read up to the last record. A list without one reads as empty, as does the single RTH of a cleared one."""
+        """Read up to the last record. A list without one reads as empty, as does the single RTH of a cleared list."""
         known = yield from self._read_list()
         yield from self._clear_step()
         return known
@@ -149,7 +149,7 @@ class MultiwiiMissions(NavMissions):
         return known
 
     def is_current(self) -> Conversation[bool]:
-        """Read some records, while disarmed: nothing else shows that another client has changed the list.
+        """Read some records, while disarmed: only this shows whether another client has changed the list.
 
         In flight, a return home may begin between two requests.
         """

@@ -144,7 +144,7 @@ class Profile:
 
     name: for people and logs. family: profiles of one firmware share it. A board that switches protocol stays in it.
     recognise: MSP only. Returns the flight controller if the interview shows that it is this kind.
-    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout. The common ones
+    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout. The common decoders
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
     currents_per_a: the unit of ANALOG's current is 1 A divided by this.
     acc_axes: index and sign of the forward, right and downward acceleration in its RAW_IMU.

@@ -119,7 +119,7 @@ class Budgets:
 
     def __init__(self) -> None:
         self.totals = {cost: TokenBucket(cost.total) for cost in Cost}
-        self._hosts: OrderedDict[Hashable, Budget] = OrderedDict()  # the one asked for least recently first
+        self._hosts: OrderedDict[Hashable, Budget] = OrderedDict()  # the address asked for least recently first
 
     def of(self, host: Hashable) -> Budget:
         budget = self._hosts.pop(host, None) or Budget(self.totals)

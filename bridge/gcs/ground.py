@@ -113,7 +113,7 @@ class Ground:
         self.everyone = [*self._heard.values(), *unheard]
 
     def gone(self, peer: Peer) -> None:
-        """Forget a station. A configured one starts from scratch."""
+        """Forget a station. A configured station starts from scratch."""
         for stations in (self._unheard, self._heard, self._unproven):
             if (station := stations.pop(peer, None)) is not None:
                 station.has_left = True

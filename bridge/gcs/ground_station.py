@@ -216,7 +216,7 @@ class Sender:
         self.mission_ack(refusal.ack, mission_type)
 
     def is_older(self, number: int) -> bool:
-        """True if the last frame is late, and was sent before the one with this number."""
+        """True if the last frame is late, and was sent before the frame with this number."""
         return self.is_late and 0 < (number - self.number) & 0xFF <= _MOST_LATE
 
 

@@ -61,7 +61,7 @@ def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, floa
 
 
 def take_due(stations: Sequence["GroundStation"], msgid: int, default_s: float, now: float) -> list["GroundStation"]:
-    """The stations for which the message is due now. Schedules the next one for each."""
+    """The stations for which the message is due now. Schedules the next for each."""
     taken, cost_s = [], len(stations) / _MOST_PER_S
     for station in stations:
         rates = station.rates

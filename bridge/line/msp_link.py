@@ -61,7 +61,7 @@ _COMMAND, _DEADLINE = attrgetter("command"), attrgetter("deadline")
 _REPLY_SIZE, _MAY_WAIT = attrgetter("reply_size"), attrgetter("may_wait")
 RESYNC = b"".join(request(command) for command in _RESYNC_COMMANDS)
 RESYNC_REPLY_SIZE = sum(_REPLY_SIZES[command] for command in _RESYNC_COMMANDS)
-#: Replies come in order: the reply to this shows that earlier ones are lost. No other code may use this command.
+#: Replies come in order: the reply to this shows that earlier replies are lost. No other code may use this command.
 #: Harakiri answers with an error frame. A board that ignores unknown commands is never identified.
 _QUESTION = Send(request(Msp.API_VERSION), Msp.API_VERSION, FRAME_OVERHEAD)
 
@@ -125,7 +125,7 @@ class LastReplies:
     """The last reply to each request, including errors, by the request's frame."""
 
     def __init__(self) -> None:
-        self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the one heard least recently first
+        self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the command heard least recently first
         #: Constant replies that were heard twice: MSP's 8-bit checksum misses some damage.
         self._confirmed: dict[bytes, MspFrame] = {}
 
@@ -252,7 +252,7 @@ class MspLink:
     def send(self, message: Send, now: float) -> None:
         """Send a request as soon as the flight controller has room for the reply."""
         if not (self.any_byte or is_clean(message.frame)):
-            # Impossible by construction (protocols.msp.command_line). If it did happen, sending nothing is safe.
+            # Impossible by construction (protocols.msp.command_line). If it did happen, not sending is safe.
             raise AssertionError(f"frame with a hazard byte: {message.frame.hex()}")
         self._waiting.append(message)
         self._flush(now)
@@ -304,7 +304,7 @@ class MspLink:
     def complete_at(self) -> float:
         """Before this time only a part of the awaited replies can have arrived; -infinity if they must not wait.
 
-        A slow line delivers a long reply in pieces, and several replies one by one. Polled ones are read together. A
+        A slow line delivers a long reply in pieces, and several replies one by one. Polled replies are read together. A
         queued request is sent as soon as a reply leaves room for it.
         """
         if self._waiting or not (self.byte_s and self._sent and all(map(_MAY_WAIT, self._sent))):
@@ -345,7 +345,7 @@ class MspLink:
             message = self._waiting[0]
             if message.reply_size > self._room_in_ring():
                 if all(sent.reply is _Reply.LOST for sent in self._sent) and self._fits_ring(_QUESTION.reply_size):
-                    # Only lost requests block this one: the reply to a short request behind them clears them.
+                    # Only lost requests block this request: the reply to a short request behind them clears them.
                     self._ask(_QUESTION, now)
                 return
             self._waiting.popleft()

@@ -4,7 +4,7 @@
 Each poll has a requested interval: the fastest that a ground station asked for or the bridge itself needs. The line
 may stretch it: requests and replies together get a share of the bytes, or of the board's time if that is scarcer
 (missions and commands have the rest), and lost replies slow all polls down until they arrive again. A poll is repeated
-only after the reply has arrived or timed out, so a long round trip slows the fast ones down by itself.
+only after the reply has arrived or timed out, so a long round trip slows the fast polls down by itself.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -41,9 +41,9 @@ _CURRENT_S = 1.0
 #: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of its
 #: interval: at the default rates all others join ATTITUDE.
 _EARLY, _EARLIEST_S = 0.2, 0.05
-#: Replies to polls with at least this interval may be read together. A client of faster ones needs fresh values.
+#: Replies to polls with at least this interval may be read together. A client of faster polls needs fresh values.
 _MAY_WAIT_S = 0.08
-#: A poll's first lost reply reduces all rates by a tenth, and each received one restores a little: 1 % losses change
+#: A poll's first lost reply reduces all rates by a tenth, and each received reply restores a little: 1 % losses change
 #: nothing, 10 % halve the rates.
 _LOSS_FACTOR = 0.9
 _RECOVERY = 0.005

@@ -63,7 +63,7 @@ class Runner:
 
     def __init__(self, do: Callable[[StoreEffect], object]) -> None:
         self._do = do
-        #: The commands whose replies the running conversation waits for: the next one is passed to `advance`.
+        #: The commands whose replies the running conversation waits for: the next is passed to `advance`.
         self.awaited_replies: frozenset[int] = frozenset()
         self._link: MspLink | None = None
         self._queue: deque[Task[Any]] = deque()
@@ -156,7 +156,7 @@ class Runner:
             self._run(None, now)
 
     def advance(self, answer: object, now: float) -> None:
-        """Resume the current conversation with the answer that it waits for. Start the next ones when it ends."""
+        """Resume the current conversation with the answer that it waits for. Start the next when it ends."""
         try:
             self._run(answer, now)
         finally:

@@ -181,7 +181,7 @@ class MissionProgress:
     def __init__(self) -> None:
         self.number = 0
         self.progress = Progress.NOT_STARTED
-        #: The record that a ground station sets: the one that is left for it is not reached.
+        #: The record that a ground station sets: the record that is left for it is not reached.
         self.set_to = 0
         self._action = 0
         self._reached: int | None = None

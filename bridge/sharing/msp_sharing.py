@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Answers MSP requests of other programs, from the last replies to the bridge itself or from the flight controller.
 
-A reply that is known costs the line nothing, in flight and during a mission transfer, too. The others are requested
+A reply that is known costs no time on the line, in flight and during a mission transfer, too. The others are requested
 one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part of the
 line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s its
 program is disconnected, because programs misread MSP's error reply: INAV Configurator mistakes it for success.
@@ -58,7 +58,7 @@ class MspSharing:
     _ground: Ground
     _emit: Emit
     _on_change: Callable[[float], None]
-    _programs: deque[Program] = field(default_factory=deque)  # the next one to have a request forwarded first
+    _programs: deque[Program] = field(default_factory=deque)  # the next program to have a request forwarded first
     _total: TokenBucket = field(default_factory=partial(TokenBucket, _TOTAL))
     _forwarded: WaitingRequest | None = None
     #: When the line has carried the last forwarded request and the reply.
@@ -89,7 +89,7 @@ class MspSharing:
             self.tick(now)
 
     def stop(self) -> None:
-        """Forward nothing more: the bridge is stopping."""
+        """Stop forwarding: the bridge is stopping."""
         self._stopped = True
 
     def tick(self, now: float) -> None:

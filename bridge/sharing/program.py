@@ -60,7 +60,7 @@ class Program:
         if not self._budget.has(now):
             return None
         if self.close is None:
-            # Complete requests only: the rest of a truncated one may be lost.
+            # Complete requests only: the rest of a truncated request may be lost.
             self._parser = MspParser(takes_low_v2=True)
         requests = [frame for frame in self._parser.feed(data[-_READ_SIZE:]) if frame.direction is Direction.REQUEST]
         self._budget.spend(len(requests))

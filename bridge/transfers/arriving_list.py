@@ -16,7 +16,7 @@ from reports.verdict import Verdict
 _FIRST_TIMEOUT_S = 0.25
 _MAX_TIMEOUT_S = 0.75
 #: QGroundControl gives up 1.5 s after the last request that it received, so a lost one is repeated several times until
-#: then. Later ones are rarer: Mission Planner gives up after ten that it received.
+#: then. Later repeats are rarer: Mission Planner gives up after ten that it received.
 _OFTEN_S = 1.5
 _SELDOM_S = 0.7
 #: A sender of this many items that were not requested begins each list with item 0.
@@ -27,7 +27,7 @@ class Reply(Enum):
     """The response to an item that neither completes the list nor leads to the next request."""
 
     NONE = auto()
-    #: The item belongs to another list: discard this one, and request item 0.
+    #: The item belongs to another list: discard this list, and request item 0.
     START_AGAIN = auto()
 
 
@@ -119,7 +119,7 @@ class ArrivingList:
         self._one_until = 0.0
         #: Items 0.._compared-1 were the same the second time, or None if they are not requested again.
         self._compared: int | None = None
-        #: Items that arrived unrequested: new ones, or repeats of another than requested a second time.
+        #: Items that arrived unrequested: new items, or repeats of another than requested a second time.
         self._unrequested = 0
 
     @property

@@ -18,7 +18,7 @@ from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 #: A download has ended after this long without a request, even if its MISSION_ACK was lost. Mission Planner repeats
 #: the request for an item for 15 s.
 _READING_S = 20.0
-#: Requests waiting for the list to be read; further ones are dropped, and their senders repeat them.
+#: Requests waiting for the list to be read; further requests are dropped, and their senders repeat them.
 _MAX_QUESTIONS = 32
 #: Mission Planner repeats a request after 2.5 s. A position arrives within that time if there is a GPS.
 _POSITION_WAIT_S = 2.0
@@ -63,7 +63,7 @@ class MissionDownloads:
             self._ask(question, now)
 
     def forget(self, sender: Sender) -> None:
-        """The ground station has read the list, or writes a new one."""
+        """The ground station has read the list, or writes a new list."""
         self._memory(sender).download = None
 
     def _memory(self, sender: Sender) -> TransferMemory:

@@ -258,5 +258,5 @@ _ROWS: Mapping[type[UploadState], _Row] = {
     DeliveringUnanswered:    (*_WRITING, _STAYS,                  _STAYS),
 }
 # fmt: on
-#: State -> event -> next state. A clear asks for nothing first: it waits, and is complete.
+#: State -> event -> next state. A clear does not ask for items: it waits, and is complete.
 TRANSITIONS = {state: dict(zip(_EVENTS, row, strict=True)) for state, row in _ROWS.items()}

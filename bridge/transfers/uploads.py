@@ -301,13 +301,13 @@ class MissionUploads:
         state, to = upload.state, upload.sender
         if isinstance(state, Receiving):
             self.due = min(self.due, state.list.request.due)
-        # By id 40: the only one that Mission Planner understands in both modes.
+        # By id 40: all that Mission Planner understands in both modes.
         ids, kind = (to.sysid, to.compid), self._missions.mission_type
         make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
         to.to(*map(make, seqs))
 
     def _delivery(self, upload: Upload, whole: WholeList) -> Conversation[DeliveryResult]:
-        """Store the list and write it. A rejected one is only stored, unless the sender sent too many of them."""
+        """Store the list and write it. A rejected list is only stored, unless the sender sent too many of them."""
         is_kept = whole.verdict.result is not Result.REJECTED or upload.sender.station.allows(Cost.STORED)
         arrived = ArrivedMission(
             str(upload.sender), whole.items, whole.verdict, upload.sender.identity, lambda: upload.is_write_fast

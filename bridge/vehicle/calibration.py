@@ -57,7 +57,7 @@ _MAX_TILT = 0.05
 
 @dataclass(frozen=True, slots=True)
 class FcAction:
-    """A calibration. `needs`: the sensor. A Harakiri does nothing else until it is done, and then restarts.
+    """A calibration. `needs`: the sensor. A Harakiri stops all else until it is done, and then restarts.
 
     name, instruction: for the pilot.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""COMMAND_LONG and COMMAND_INT: every one is acknowledged (https://mavlink.io/en/services/command.html).
+"""COMMAND_LONG and COMMAND_INT: all are acknowledged (https://mavlink.io/en/services/command.html).
 
 No command may arm, steer or restart an aircraft. Those that would are refused with a reason. The exception is
 DO_SET_MISSION_CURRENT on an INAV that flies the mission.

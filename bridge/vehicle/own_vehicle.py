@@ -37,7 +37,7 @@ from reports.verdict import SentSeqs
 _TICK_S = 1.0
 #: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: Without a reading for this long nothing is known: SYS_STATUS is sent anyway, and no item is shown as flown to.
+#: Values are unknown without a reading for this long: SYS_STATUS is sent anyway, and no item is shown as flown to.
 _SILENT_S = 3.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0

@@ -65,9 +65,9 @@ class VehicleReporter:
     _readiness: CraftReadiness
     _want: Callable[[Mapping[type[v.Reading], float]], None]
     _progress: MissionProgress
-    #: The groups in use: they are polled, and the updated ones published.
+    #: The groups in use: they are polled, and those updated published.
     watched: frozenset[Group] = frozenset()
-    #: The updated ones.
+    #: Those updated.
     fresh: set[Group] = field(default_factory=set)
     _published_at: dict[Group, float] = field(default_factory=dict)
     #: The readings that were fresh, and when the first of them becomes stale.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texts for the pilot about a written mission: the findings with equal ones merged, and a summary line."""
+"""The texts for the pilot about a written mission: the findings with equals merged, and a summary line."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence

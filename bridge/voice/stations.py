@@ -88,7 +88,7 @@ def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
 
 
 def pieces(text: str, kind: Kind) -> list[str]:
-    """A text in pieces of 50 characters. The last one is shorter, which ends the text for clients that join pieces.
+    """A text in pieces of 50 characters. The last is shorter, which ends the text for clients that join pieces.
 
     MAVSDK joins them without a separator. Others show each alone: they are split at spaces, and padded.
     """

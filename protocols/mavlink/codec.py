@@ -91,7 +91,7 @@ def _sent_fields(msgid: int) -> list[tuple[str, bool]]:
     ]
 
 
-# Messages packed by struct: the one sent ten times a second, and the one that pymavlink lacks.
+# Messages packed by struct: ATTITUDE, sent ten times a second, and the message that pymavlink lacks.
 
 
 def pack_attitude(boot_ms: int, *angles_and_rates: float) -> Packed:

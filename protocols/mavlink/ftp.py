@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink FTP, the reading half: virtual files, no folders (https://mavlink.io/en/services/ftp.html). Sans-IO.
 
-Requests that write are refused. A path names one of the virtual files or nothing.
+Requests that write are refused. A path names one of the virtual files, or does not exist.
 """
 
 import struct
@@ -14,7 +14,7 @@ from protocols.plain_text import plain_text
 _HEADER = struct.Struct("<HBBBBBBI")
 _PAYLOAD_SIZE, _OPCODE_AT = 251, 3
 MOST_DATA = _PAYLOAD_SIZE - _HEADER.size
-#: Packets of one burst. The client asks for the next ones.
+#: Packets of one burst. The client asks for the next.
 _BURST = 16
 _ACK, _NAK = 128, 129
 #: FailErrno and EOPNOTSUPP. Mission Planner ignores "unknown command" and repeats its request for 70 s.

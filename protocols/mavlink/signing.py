@@ -44,7 +44,7 @@ class Timestamps:
     """The timestamps of outgoing frames: the time, but strictly increasing even if the clock steps back.
 
     `clock` returns seconds since the Unix epoch. `at_least`: the last one of an earlier run. `newest`: the newest that
-    any peer with the key had, or None if the next one is believed. `is_clock_set`: False while the clock may be weeks
+    any peer with the key had, or None if the next is believed. `is_clock_set`: False while the clock may be weeks
     behind, so that a peer's lead is not a fault of the peer.
     """
 

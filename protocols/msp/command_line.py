@@ -45,7 +45,7 @@ def _printable(data: bytes) -> bytes:
 
 
 class EchoWatch:
-    """Compares received bytes with sent ones. `sent`: the last requests."""
+    """Compares received bytes with those sent. `sent`: the last requests."""
 
     def __init__(self) -> None:
         self.sent: deque[bytes] = deque(maxlen=_FRAMES_KEPT)

@@ -56,7 +56,7 @@ def _slots(payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _is_of(held: bytes, number: int) -> bool:
-    """True if it is a range of this mode. An unused one has no width."""
+    """True if it is a range of this mode. An unused range has no width."""
     return held[0] == number and held[2] < held[3]
 
 

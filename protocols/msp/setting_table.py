@@ -78,7 +78,7 @@ class HeldSetting(NamedTuple):
 
 
 class SettingsReply(NamedTuple):
-    """Reply to SETTING: as many settings from `first` on as fit. To SET_SETTING: that one, even if out of range."""
+    """Reply to SETTING: as many settings from `first` on as fit. To SET_SETTING: that setting, even if out of range."""
 
     status: ReplyStatus
     first: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Replies with the vehicle's state. Harakiri's lengths are the minimum. Related firmware sends longer ones.
+"""Replies with the vehicle's state. Harakiri's lengths are the minimum. Related firmware sends longer replies.
 
 Layouts: Harakiri's serial.c; INAV's fc_msp.c. A payload that is too short gives None.
 """

@@ -93,7 +93,7 @@ _BUFFER, _EXTENDED_BUFFER, _NEW_BUFFER = 64, 243, 192
 
 # -- Descendants of MultiWii with the buffer ---------------------------------------------------------------------------
 
-#: The first two are requested to distinguish these boards from newer ones: they answer with an error.
+#: The first two are requested to distinguish these boards from newer boards: those answer with an error.
 _OLD_READS = _reads(
     API_VERSION=(1, 0), FC_VARIANT=(2, 0),
     IDENT=(100, 7), STATUS=(101, 11), RAW_IMU=(102, 18), SERVO=(103, 16), MOTOR=(104, 16), RC=(105, 36),
@@ -218,7 +218,7 @@ _BETAFLIGHT: Rights = {
     **_moves(SET_WP=209, SEND_DSHOT_COMMAND=0x3003),
     **_refused(MULTIPLE_MSP=230),
 }  # fmt: skip
-#: Only later versions understand v2. The first ones have the buffer of MultiWii.
+#: Only later versions understand v2. The first versions have the buffer of MultiWii.
 _CLEANFLIGHT: Rights = {
     command: right._replace(lengths=range(_BUFFER + 1)) if right.effect is Effect.CHANGE else right
     for command, right in _BETAFLIGHT.items()

@@ -25,7 +25,7 @@ def start() -> None:
 
 
 def _open_standard_streams() -> None:
-    """Replace closed ones (`>&-`) by /dev/null: a serial port must not become descriptor 1 or 2.
+    """Replace closed streams (`>&-`) by /dev/null: a serial port must not become descriptor 1 or 2.
 
     A letter that the terminal's encoding lacks, as in a file's name, is printed as a question mark.
     """

@@ -254,7 +254,7 @@ def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[
 
 
 def _held(client: BridgeClient) -> Json:
-    """All settings, with a complaint if they may not be the present ones."""
+    """All settings, with a complaint if they may not be up to date."""
     held = client.ask({"do": "settings"})
     if not held["is_checked"]:
         complain("the flight controller cannot be asked now: these are its settings as last read")

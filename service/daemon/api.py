@@ -187,7 +187,7 @@ def delivery_data(outcome: DeliveryResult | Refusal, arrived: ArrivedMission | N
 
 
 def _fields(thing: MissionSummary | StoredMission | ReceivedMission) -> Json:
-    """The fields by name. Unlike asdict() it copies nothing: for 146 items that would take 8 ms of the loop."""
+    """The fields by name. Unlike asdict() it does not copy: for 146 items that would take 8 ms of the loop."""
     return {field.name: getattr(thing, field.name) for field in fields(thing)}
 
 

@@ -75,7 +75,7 @@ class FcConnection:
         return self._port.dropped_bytes
 
     def ports(self) -> dict[str, object]:
-        """With `fc = "auto"`, for the status: the port in use, and the skipped ones with the reasons."""
+        """With `fc = "auto"`, for the status: the port in use, and those skipped with the reasons."""
         return {} if self._finder is None else self._finder.status()
 
     async def run(self) -> None:

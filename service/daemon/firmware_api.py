@@ -102,7 +102,7 @@ class FirmwareApi:
         return {"text": text, "backup": str(backup), "seconds": round(self._loop.time() - began, 1)}
 
     def _check_board(self, with_battery: bool) -> bool:
-        """True if a disarmed Harakiri answers, False if nothing does. ControlError if the board must not be touched."""
+        """True if a disarmed Harakiri answers, False if no board does. ControlError if it must not be touched."""
         daemon, report = self._daemon, self._daemon.report()
         link, why = report.link, ""
         voltage, age_s = report.battery.voltage_v, report.battery.age_s
@@ -210,7 +210,7 @@ class FirmwareApi:
         )
 
     async def _proof(self, wanted: str | None) -> str:
-        """The running firmware. Raises ControlError if it is not `wanted`, or nothing answers."""
+        """The running firmware. Raises ControlError if it is not `wanted`, or does not answer."""
         for _ in range(int(_PROOF_S / _LOOK_S)):
             if (found := self._daemon.report().link.flight_controller) is not None:
                 if wanted in (None, found):

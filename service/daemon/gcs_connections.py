@@ -46,7 +46,7 @@ class GcsConnections:
         self._links[link.name] = link
 
     def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> tuple[GcsAddress, ...]:
-        """Replace links. Those that stay are not interrupted. Returns the open ones."""
+        """Replace links. Those that stay are not interrupted. Returns those open."""
         for address in old:
             if address not in new and (link := self._links.get(str(address))) is not None:
                 self._bridge.link_closed(link.name, self._loop.time())

@@ -23,8 +23,8 @@ DEVICE_ERRORS = (OSError, termios.error, ValueError)
 #: A poll takes 75 ms at 1200 baud.
 _LAST_FRAME_S = 0.1
 _TIMEOUT_S = 3.0
-#: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries data
-#: at once. The old one might wait for as long again as the gap was.
+#: A connection whose other end confirms nothing for this long is lost. After a gap in the Wi-Fi a new one carries
+#: data at once. The old connection might wait for as long again as the gap was.
 _TCP_STALL_MS = 5000
 
 

@@ -15,8 +15,8 @@ from storage.os_error import reason
 
 #: A program that does not read the replies is disconnected.
 _MAX_UNSENT = 65536
-#: A further program displaces the one that has been silent for longest, of the host with the most programs: its laptop
-#: may have been switched off.
+#: A further program displaces the program that has been silent for longest, of the host with the most programs: the
+#: laptop may have been switched off.
 _MAX_PROGRAMS = 8
 
 
@@ -53,7 +53,7 @@ class _SharePort:
         self._flush = flush
         self._may_write = may_write
         self._loop = asyncio.get_running_loop()
-        self._programs: dict[Program, Callable[[], None]] = {}  # the one silent for longest first
+        self._programs: dict[Program, Callable[[], None]] = {}  # the program silent for longest first
 
     def join(
         self,

@@ -138,13 +138,13 @@ class PortFinder:
             self._wait(_RETURN_S)
 
     def status(self) -> dict[str, Any]:
-        """The port in use, and the skipped ones with the reasons."""
+        """The port in use, and those skipped with the reasons."""
         present = None if self._present is None else self._present.path
         skipped = [f"{path}: {why}" for path, why in sorted(self._passed.items()) if path != present]
         return {"port": present, "ports_passed_over": skipped}
 
     def _in_turn(self) -> list[SerialPort]:
-        """The ports not tried in this round, the flight controller's last one first."""
+        """The ports not tried in this round, the flight controller's last port first."""
         ports = [port for port in serial_ports(self._host) if str(self._host.resolve(port.path)) not in self._radios]
         there = {port.path for port in ports}
         self._passed = {path: why for path, why in self._passed.items() if path in there}

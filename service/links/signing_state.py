@@ -2,7 +2,7 @@
 """The keys of a daemon's links, and their signing timestamps, which survive a restart.
 
 A Pi has no battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
-timestamps, and recorded ones would be accepted. So the last timestamp is kept in a file. To spare the SD card, the file
+timestamps, and recorded signatures would be accepted. So the last timestamp is kept in a file. To spare the SD card, it
 runs 10 s ahead. A clean stop writes the true value. After a power cut the timestamps heard since the last write are
 unknown, but all are below the file's: nothing up to that time is accepted any more, also after another restart.
 """
@@ -70,7 +70,7 @@ class SigningState:
             self._look(asyncio.get_running_loop(), self._file)
 
     def reset(self) -> None:
-        """Forget the timestamps of all ground stations. The next one with the key is believed."""
+        """Forget the timestamps of all ground stations. The next station with the key is believed."""
         self._timestamps.forget()
         for signing in self._signings.values():
             signing.forget()

@@ -2,7 +2,7 @@
 """Ground stations over UDP.
 
 A connected station of an udpin link has a socket of its own on the same port, to which the kernel passes only its
-datagrams: a flood from others fills the queue of the open socket, not of this one.
+datagrams: a flood from others fills the queue of the open socket, not of this socket.
 """
 
 import asyncio
@@ -61,7 +61,7 @@ class UdpLink:
         self._loop.add_reader(self._socket.fileno(), self._readable)
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send one datagram, or drop it: MAVLink repeats the important ones."""
+        """Send one datagram, or drop it: MAVLink repeats the important frames."""
         try:
             if (own := self._own.get(peer)) is not None:
                 own.send(data)

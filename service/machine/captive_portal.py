@@ -63,7 +63,7 @@ class _Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET  # noqa: N815  # the name that BaseHTTPRequestHandler looks for
 
     def log_message(self, *_: object) -> None:
-        """A phone asks every few seconds: nothing is logged."""
+        """A phone asks every few seconds: that is not logged."""
 
 
 class _Server(ThreadingHTTPServer):

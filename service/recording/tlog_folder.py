@@ -47,7 +47,7 @@ def free_space(folder: Path) -> int:
 class TlogFolder:
     """Appends to a file that is opened at the first write. `most`: the bytes of all files together.
 
-    Disk errors must not affect a flight, so nothing raises. A failure is logged once, and retried later.
+    Disk errors must not affect a flight, so methods do not raise. A failure is logged once, and retried later.
     """
 
     def __init__(self, folder: Path, most: int, measure_free_space: Callable[[Path], int] = free_space) -> None:
@@ -73,7 +73,7 @@ class TlogFolder:
         return f"stopped, {trouble}" if trouble else f"nothing yet, in {self._folder}"
 
     def write(self, records: bytes, now: float, *, is_flight: bool = False) -> None:
-        """Append whole records to the open file, or to a new one. `now`: seconds of a monotonic clock."""
+        """Append whole records to the open file, or to a new file. `now`: seconds of a monotonic clock."""
         if not records or now < self._retry_at:
             return
         try:

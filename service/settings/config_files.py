@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The configuration files of one folder: the status page's, setup's answers, the configuration file. Later ones win."""
+"""The configuration files of one folder: the status page's, setup's answers, the main file. Later files win."""
 
 import difflib
 import re

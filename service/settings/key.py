@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One setting: its name, its meaning, how the value is read, and the problems of a wrong one."""
+"""One setting: its name, its meaning, how the value is read, and the problems of a wrong value."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class SettingsError(ValueError):
 
 
 class Reader(NamedTuple):
-    """Converts a given value to the one used. `read` gets the value, and the folder of the file.
+    """Converts a given value to the value used. `read` gets the value, and the folder of the file.
 
     It raises Unfit, or another ValueError with a whole sentence. `choices`: all values, as in the file, if they can be
     listed.

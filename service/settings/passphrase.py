@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Passphrases of signing keys: how hard they are to guess, and new ones.
+"""Passphrases of signing keys: how hard they are to guess, and new keys.
 
 Anyone who records one signed packet can try passphrases on it, without the bridge noticing: a key is the passphrase's
 SHA-256, of which a graphics card computes thousands of millions a second.
@@ -16,7 +16,7 @@ STRONGER = "make a random one: sudo naze-bridge setup --new-key"
 #: No character that looks like another, and no capitals to type on a phone.
 _ALPHABET = "abcdefghjkmnpqrstvwxyz23456789"
 _GROUPS, _GROUP_SIZE = 4, 5
-#: Characters that a guesser has to try for each class in use; other ones count as 100.
+#: Characters that a guesser has to try for each class in use; others count as 100.
 _CLASSES = (string.ascii_lowercase, string.ascii_uppercase, string.digits, string.punctuation + " ")
 _OTHERS = 100
 

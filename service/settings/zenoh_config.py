@@ -11,7 +11,7 @@ from payloads.names import ZenohSettingsError
 from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
 from storage.os_error import reason
 
-#: Commands up to 10 MB get a reply. Larger ones are not assembled in a Pi's memory.
+#: Commands up to 10 MB get a reply. Larger commands are not assembled in a Pi's memory.
 _MAX_MESSAGE_BYTES = 16 << 20
 #: Bytes, doubled by the kernel. Two seconds of telemetry; enough for 300 kB/s at a round trip of 100 ms.
 _SEND_BUFFER_BYTES = 16 << 10

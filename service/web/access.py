@@ -88,7 +88,7 @@ def check_token(request: Request) -> None:
 
 
 def route(method: str, path: str, handler: Handler, *checks: Callable[[Request], None], max_body: int = 0) -> Route:
-    """A route whose requests are checked first. `checks`: further ones, such as check_token. `max_body`: bytes."""
+    """A route whose requests are checked first. `checks`: further checks, such as check_token. `max_body`: bytes."""
 
     async def answer(request: Request) -> Response:
         if not is_own_name(request.headers.get("host", ""), request.app.state.hosts):

@@ -148,7 +148,7 @@ class PiControl:
         return json_reply({"count": count, "lines": [line._asdict() for line in lines]})
 
     def _append(self, start: int, piece: bytes) -> int:
-        """Append a piece that follows the ones before; FileNotFoundError if it does not. Returns the size so far."""
+        """Append a piece that follows those before; FileNotFoundError if it does not. Returns the size so far."""
         if start == 0:
             self._drop_package()
             # Without a name: the kernel removes it with the daemon.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies of requests, numbers in them, JSON responses, and the turns of long ones."""
+"""Bodies of requests, numbers in them, JSON responses, and the turns of long replies."""
 
 import asyncio
 from collections.abc import AsyncIterator

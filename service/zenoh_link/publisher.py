@@ -15,7 +15,7 @@ from payloads.mission_data import Json
 from payloads.payload import Payloads, attachment_of, encode, encoding_of
 from service.machine.threads import post
 
-#: How soon after a sample its number is published, so that a subscriber notices if the last one was lost.
+#: How soon after a sample its number is published, so that a subscriber notices if the last was lost.
 _LAST_NUMBER_S = 1.0
 
 

@@ -80,7 +80,7 @@ class SampleRates:
         return self._overview.admits(marks, now)
 
     def _is_news(self, group: Group, sample: Any, now: float) -> bool:
-        """True if a sample differs noticeably from the last, or that one is long ago."""
+        """True if a sample differs noticeably from the last, or the last is long ago."""
         last, until = self._last[group]
         return now >= until or any(
             _differs(getattr(sample, field), getattr(last, field), step) for field, step in _CHANGES[group].items()

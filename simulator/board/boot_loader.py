@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The boot loader in an STM32F103's ROM, on USART1 at 115200 baud: AN3155's commands, served as the ROM does.
 
-It polls: a byte that arrives during a flash operation waits in the data register, and the following ones are lost. It
+It polls: a byte that arrives during a flash operation waits in the data register, and the following are lost. It
 has no timeout, and a first byte other than 0x7F makes it measure a wrong speed, so it is deaf until the next reset.
 """
 

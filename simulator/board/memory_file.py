@@ -8,7 +8,7 @@ import click
 
 
 def open_memory(path: Path, blank: bytes, hint: str) -> memoryview:
-    """Map the file. A new one is `blank`. click.ClickException, with a hint if the file belongs to another board."""
+    """Map the file. A new file is `blank`. click.ClickException, with a hint if the file belongs to another board."""
     try:
         if not path.exists():
             path.write_bytes(blank)

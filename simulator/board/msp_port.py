@@ -71,7 +71,7 @@ class MspReceiver:
 
     @property
     def buffer(self) -> bytes:
-        """The payload of the last request, followed by leftovers of earlier ones."""
+        """The payload of the last request, followed by leftovers of earlier requests."""
         return bytes(self._buffer)
 
     def overwrite(self, data: bytes) -> None:

@@ -33,7 +33,7 @@ class SimOptions:
     looptime_ms: float = 3.0
     tree: Tree = Tree.TESTCODE3
     boot_ms: float = 7100.0
-    #: Bytes before this are lost. Later ones wait in the ring for the end of the boot.
+    #: Bytes before this are lost. Later bytes wait in the ring for the end of the boot.
     reception_ms: float = 470.0
     tele_prot: TelemetryProtocol = TelemetryProtocol.MSP
 

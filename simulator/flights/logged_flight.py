@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A real flight of a mission from the bridge's telemetry log, as a sortie: it is judged like a simulated one.
+"""A real flight of a mission from the bridge's telemetry log, as a sortie: it is judged like a simulated flight.
 
 The track is the board's own: the GPS, the height and the attitude.
 """

@@ -22,7 +22,7 @@ FAKE = NavWaypoint()
 
 
 class InavMission:
-    """`eeprom`: EEPROM_SIZE bytes. Blank ones are zeros, an invalid action for INAV."""
+    """`eeprom`: EEPROM_SIZE bytes. Blank bytes are zeros, an invalid action for INAV."""
 
     def __init__(self, eeprom: memoryview) -> None:
         self._eeprom = eeprom
@@ -42,7 +42,7 @@ class InavMission:
 
     @property
     def stored(self) -> bytes:
-        """The waypoints in the EEPROM, each of WAYPOINT_SIZE bytes, up to the one with the flag LAST."""
+        """The waypoints in the EEPROM, each of WAYPOINT_SIZE bytes, up to the record with the flag LAST."""
         for number in range(1, CAPACITY + 1):
             if self._saved(number).flag == FLAG_LAST:
                 return bytes(self._eeprom[: number * WAYPOINT_SIZE])

@@ -51,7 +51,7 @@ class PartialReplyError(Exception):
 
 
 class InavPlaces:
-    """`stored`: PLACES_SIZE bytes of the EEPROM. The first one is set once they were saved."""
+    """`stored`: PLACES_SIZE bytes of the EEPROM. The first is set once they were saved."""
 
     def __init__(self, stored: memoryview, version: tuple[int, ...]) -> None:
         self._stored = stored
@@ -152,7 +152,7 @@ class InavPlaces:
     # -- In force since the boot -----------------------------------------------------------------------------
 
     def blocks_arming(self, position: tuple[int, int]) -> bool:
-        """True on the ground inside an exclusive zone, or outside of the inclusive ones if one is near."""
+        """True on the ground inside an exclusive zone, or outside of the inclusive zones if one is near."""
         zones = [(number, _ZONE.unpack(zone)) for number, zone in enumerate(self._zones_in_force)]
         active = [(number, zone) for number, zone in zones if zone[6]]
         if sum(zone[6] for _, zone in active) != len(self._vertices_in_force):

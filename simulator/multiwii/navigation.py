@@ -53,7 +53,7 @@ class MultiWiiNavigation:
         return NavStatus(self.mode, self.state, self.step.action, self.number, self._error, round(self._craft.heading))
 
     def fly(self, seconds: float, mode: Mode) -> None:
-        """Advance the flight. `mode`: the one that the pilot's switches select."""
+        """Advance the flight. `mode`: as the pilot's switches select."""
         if mode is not self.mode:
             self.end(Error.NONE)
             self.mode = mode

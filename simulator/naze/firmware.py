@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri from one boot to the next: its main loop, and the serial port as in serialCom (serial.c, mw.c).
 
-This object is the RAM, so a new one is a reset.
+This object is the RAM, so a new object is a reset.
 """
 
 import contextlib

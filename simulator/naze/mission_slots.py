@@ -38,7 +38,7 @@ def flash_size(options: SimOptions) -> int:
 
 
 class MissionSlots:
-    """The stored list, and the one being staged in the other slot."""
+    """The stored list, and the list being staged in the other slot."""
 
     def __init__(self, flash: NorFlash, options: SimOptions) -> None:
         self._flash = flash

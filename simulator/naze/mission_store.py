@@ -41,7 +41,7 @@ _NOT_ALONE = (WpCommand.SETROI, WpCommand.RETURN_TO_LAUNCH, WpCommand.LAND, WpCo
 class OwnMissionStore:
     """One boot's store. `send` packs and sends a message to a partner. `on_reset`: called at the end of a transfer.
 
-    With the extension, `missions` keeps the list, and an interrupted upload leaves the old one. Without it, the list
+    With the extension, `missions` keeps the list, and an interrupted upload leaves the old list. Without it, the list
     is written with the configuration, complete or not.
     """
 

@@ -230,7 +230,7 @@ class HarakiriCheck(ListCheck):
         return None
 
     def _way_out(self, seq: int) -> str:
-        """What to remove, if only items that are not stored anyway are before this one."""
+        """What to remove, if only items that are not stored anyway are before this item."""
         dropped = [finding for finding in self._findings if finding.becomes == DROPPED]
         if not dropped or len(self._kept) > 1:
             return ""

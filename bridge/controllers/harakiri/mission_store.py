@@ -144,7 +144,7 @@ class HarakiriMissions(_HarakiriStore):
                         break
                     yield from ask(ext.ABORT_REQUEST, MissionCommand.ABORT, 1)
         except OutOfTime:
-            # The transfer stays open for 5 s: the same list continues where this one ended.
+            # The transfer stays open for 5 s: the same list continues where this push ended.
             failure = PushFailure.OUT_OF_TIME
         except Stopped:
             failure = PushFailure.STOPPED
@@ -257,7 +257,7 @@ class HarakiriMissions(_HarakiriStore):
 
 
 def _confirmed(packed: bytes, answer: Staged) -> int:
-    """The number of correct records on the flight controller. Restarts if it has other ones."""
+    """The number of correct records on the flight controller. Restarts if it has others."""
     size = answer.next * RECORD_SIZE
     if size > len(packed) or crc32(packed[:size]) != answer.checksum:
         raise PushFailed(PushFailure.NO_ANSWER, is_final=False)

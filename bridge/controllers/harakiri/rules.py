@@ -54,7 +54,7 @@ class CommandRule:
     """One row: the storable fields of one command. param3 is 0 for every command.
 
     position: required, else the item is dropped. If False, latitude and longitude are stored as 0.
-    alone: False if the mission needs another command besides this one (and ROIs).
+    alone: False if the mission needs another command besides this (and ROIs).
     """
 
     record: WpCommand

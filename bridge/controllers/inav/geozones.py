@@ -114,7 +114,7 @@ class InavGeozones(InavPlaceStore[Geozone]):
         return FenceRules(self._known or (), is_feature_on=self._is_in_force)
 
     def _write(self, wanted: tuple[Geozone, ...], held: tuple[Geozone, ...]) -> Conversation[bool]:
-        """Free the vertices of all zones that change before any new one needs them."""
+        """Free the vertices of all zones that change before any new zone needs them."""
         for zone in held:
             if zone not in wanted and not (yield from take(SET_GEOZONE, empty_geozone(zone.number))):
                 return False

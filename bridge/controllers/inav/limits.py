@@ -110,7 +110,7 @@ def _parts(record: NavRecord) -> Iterable[MissionPart]:
 
 
 class RthAltMode(IntEnum):
-    """nav_rth_alt_mode. The last one only in version 6."""
+    """nav_rth_alt_mode. The last only in version 6."""
 
     CURRENT = 0
     EXTRA = 1

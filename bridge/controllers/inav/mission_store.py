@@ -2,7 +2,7 @@
 """INAV: the list is only in RAM until SAVE. An incomplete list cannot be flown (docs/inav.md).
 
 The store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read.
-Armed, only the loaded one. Writing record 1 wipes them all, so they are written again behind a new list.
+Armed, only the loaded mission. Writing record 1 wipes them all, so they are written again behind a new list.
 """
 
 from collections.abc import Sequence
@@ -104,7 +104,7 @@ class InavMissions(NavMissions, FliesToItems):
         return result
 
     def pull(self) -> Conversation[Mission | None]:
-        """Read the loaded mission. An incomplete one reads as empty, as does the single RTH of a cleared one."""
+        """Read the loaded mission. An incomplete one reads as empty, as does the single RTH of a cleared list."""
         for _ in range(_MAX_READS):
             seen = yield from self._look()
             if seen is None:
@@ -171,7 +171,7 @@ class InavMissions(NavMissions, FliesToItems):
     def _take_over(self, records: list[NavRecord], seen: tuple[NavInfo, int]) -> None:
         self._seen, missions = seen, _split(records)
         is_armed = bool(self._vehicle.armed)
-        # Without the selected one INAV flies the first.
+        # Without the selected mission INAV flies the first.
         place = seen[1] - 1 if not is_armed and 1 <= seen[1] <= len(missions) else 0
         loaded = missions[place] if missions else ()
         if not is_armed:
@@ -211,7 +211,7 @@ class InavMissions(NavMissions, FliesToItems):
             self._limits = self._limits.with_settings(values or {})
 
     def _store_content(self, records: Mission) -> Mission:
-        """SAVE selects the first mission, so the new one goes there."""
+        """SAVE selects the first mission, so the new mission goes there."""
         return (*records, *chain.from_iterable(self.others))
 
     def _order(self, wanted: Mission) -> list[tuple[int, NavRecord]]:
@@ -269,7 +269,7 @@ class InavMissions(NavMissions, FliesToItems):
         return None
 
     def _restore(self, before: Mission | None) -> Conversation[bool]:
-        """Make it LOAD the saved missions. If that is not the old list, write that one again."""
+        """Make it LOAD the saved missions. If that is not the old list, write it again."""
         if self._vehicle.armed:
             return False
         with suppress(LinkLost):

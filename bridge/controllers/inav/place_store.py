@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's safehomes and geozones, as rally points and fences: in RAM until the configuration is written.
 
-The old ones stay in its flash until the new ones are read back equal. If they are not, the old ones are written again.
+The old places stay in its flash until the new places are read back equal. Otherwise the old places are written again.
 """
 
 from abc import abstractmethod

@@ -47,7 +47,7 @@ def _recognise(board: Interview) -> Conversation[FlightController | None]:
     # The pilot may load another mission at any time: only the capacity is constant.
     info = decode_info((yield from board.ask(Nav.GETINFO, INFO_SIZE, stable=_STABLE_INFO)).payload)
     if info is None or not info.capacity or controller.arm_bit is None:
-        # Without an arm flag nothing would prevent a mission write in flight.
+        # An arm flag is needed to prevent a mission write in flight.
         return None
     platform = decode_platform((yield from board.ask(MIXER, MIXER_SIZE)).payload)
     airframe = _AIRFRAMES[platform] if platform is not None and platform < len(_AIRFRAMES) else None

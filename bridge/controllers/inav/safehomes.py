@@ -54,7 +54,7 @@ def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ..
 def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach] = ()) -> Conversation[bool]:
     """Set those that the board lacks, and read them back. Returns False if that fails.
 
-    Of the empty ones only those are set that are not empty in `held`, the board's own.
+    Of the empty places only those are set that are not empty in `held`, the board's own.
     """
     filled = {each.number for each in (*wanted, *held) if not each.is_empty}
     for new in wanted:
@@ -75,7 +75,7 @@ def approach_text(approach: FwApproach) -> str:
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
-    """All of them, including disabled ones; none on a version without them. None: no reply, or one about another."""
+    """All of them, including those disabled; none on a version without them. None: no reply, or one about another."""
     found: list[Safehome] = []
     for number in range(SAFEHOMES):
         reply = yield from ask(encode_read_safehome(number), SAFEHOME, SAFEHOME_SIZE)

@@ -136,7 +136,7 @@ class NavCheck(ListCheck):
         if rejection := refuse_frame(item, needs_position=rule.position):
             return rejection
         p1 = self._hold(item) if rule.p1 is HOLD else self._fit(item, "p1", rule.p1)
-        # MAVLink gives these no meaning for an RTL or a ROI, so nothing is lost.
+        # MAVLink gives these no meaning for an RTL or a ROI, so they are not needed.
         news = News.NOTICE if rule.height in (AltitudeUse.FLOWN, AltitudeUse.APPROACH) else News.NONE
         for name in ("p2", "p3", "p4"):
             self._fit(item, name, UNUSED, news)
@@ -332,7 +332,7 @@ class NavCheck(ListCheck):
         return alt_cm
 
     def _unused(self, item: MissionItem, *names: str) -> None:
-        """Note values without a meaning, in `names` and the coordinates; nothing is lost."""
+        """Note values without a meaning, in `names` and the coordinates; the flight is the same."""
         for name in (*names, "alt_m"):
             self._fit(item, name, UNUSED, News.NONE)
         self._no_position(item)

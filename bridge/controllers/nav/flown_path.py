@@ -79,7 +79,7 @@ def above_home_cm(record: NavRecord, departure: Departure) -> int | None:
 
 
 def flown_size(records: Sequence[NavRecord]) -> int:
-    """The number of records up to the RTH that ends the mission: later ones that no jump reaches are not counted."""
+    """The number of records up to the RTH that ends the mission: later items that no jump reaches are not counted."""
     starts, end = {0}, -1
     while True:
         before, end = end, max(_reached(records, starts))

@@ -210,7 +210,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         raise PushFailed(PushFailure.REFUSED, is_final=False)
 
     def read(self, number: int) -> Conversation[NavRecord | None]:
-        """Read one record. Ignores replies about other ones (telemetry polls home)."""
+        """Read one record. Ignores replies about others (telemetry polls home)."""
         for _ in range(_TRIES):
             asked: Send | None = send(encode_read_wp(number), Nav.WP, WP_SIZE)
             while True:

@@ -27,7 +27,7 @@ def flies_home(record: NavRecord) -> bool:
 
 
 def keep_unshown(records: Sequence[NavRecord], current: Sequence[NavRecord]) -> tuple[list[NavRecord], str]:
-    """The records with the unshown values of those that they repeat, and the lost ones as text, "" if there are none.
+    """The records with the unshown values of those that they repeat, and those lost as text, "" if there are none.
 
     `current`: the list on the flight controller.
     """
@@ -45,7 +45,7 @@ def keep_unshown(records: Sequence[NavRecord], current: Sequence[NavRecord]) -> 
 
 
 def _repeats(record: NavRecord, old: NavRecord) -> bool:
-    """True if it has the shown values. Mission Planner truncates a sixteenth of all coordinates to the one below."""
+    """True if it has the shown values. Mission Planner truncates a sixteenth of all coordinates to the value below."""
     shown = _shown(old)
     if max(abs(record.lat_e7 - shown.lat_e7), abs(record.lon_e7 - shown.lon_e7)) > 1:
         return False

@@ -79,7 +79,7 @@ class MavlinkLine(State):
 
 
 class PassThrough(MavlinkLine):
-    """The autopilot gets nothing but the frames of ground stations, and the bridge sends nothing in its name."""
+    """The autopilot gets only the frames of ground stations, and the bridge does not send in its name."""
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)

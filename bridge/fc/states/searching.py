@@ -31,7 +31,7 @@ _HEARTBEAT_SPEEDS = (115200, 57600)
 _FULL_VISIT_S = 1.1
 _LISTEN_S = 0.1
 _PROBE_INTERVAL_S = 0.15
-#: This many probes go out at the interval above, later ones more slowly: a stalled board may answer all at once.
+#: This many probes go out at the interval above, later probes more slowly: a stalled board may answer all at once.
 _QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
@@ -44,7 +44,7 @@ _ECHO_SIZE = 5
 def visit_order(
     speeds: Sequence[int | None], good: Sequence[int | None], first: Sequence[int | None]
 ) -> Iterator[int | None]:
-    """Yield speeds forever: `first` once, then the good ones, as a board returns to them, before each of the others."""
+    """Yield speeds forever: `first` once, then the good speeds, as a board returns to them, before each other."""
     yield from first
     others = cycle(speed for speed in speeds if speed not in good)
     while True:

@@ -29,7 +29,7 @@ _AUTO = "auto"
 
 
 def overview(pi: ThisPi) -> Json:
-    """The answers to setup so far, and the settings. Changes nothing."""
+    """The answers to setup so far, and the settings. Does not change anything."""
     host = pi.host
     earlier = earlier_choices(host)
     model = pi_model(host)
@@ -52,7 +52,7 @@ def overview(pi: ThisPi) -> Json:
 
 
 def doctor(pi: ThisPi) -> Json:
-    """Doctor's checks. Changes nothing. `fix` names a remedy for the action of that name."""
+    """Doctor's checks. Does not change anything. `fix` names a remedy for the action of that name."""
     host = pi.host
     ask = partial(ask_daemon, None, STATUS)
     # The port is the daemon's, which asks.

@@ -40,7 +40,7 @@ _MOST_SSID = 32
 _PASSWORD = re.compile("[ -~]{8,63}")
 #: The search spends 9 s on a port: three are tried by then.
 _SEARCH_S = 30
-#: The service may have been taken over: a token holds nothing that acts on root's terminal.
+#: The service may have been taken over: a token must not act on root's terminal.
 _TOKEN = re.compile("[!-~]{1,256}")
 _NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
 _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
