@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state of the wires; doctor's findings, each with its remedy as a button where the Pi can carry it out; the logs.
+// Doctor's findings, each with its remedy as a button where the Pi can carry it out; the logs.
 import { aftermath, askPi, askWithToken, fetchBytes, hasToken } from "./daemon.js";
-import { action, byId, make, resultPlace, say, setText } from "./dom.js";
-import { evidence } from "./state_bar.js";
+import { action, byId, make, resultPlace, say } from "./dom.js";
 
 const PAUSE_MS = 2000, MOST_LINES = 300;
 const GRADES = { problem: ["bad", "Problem"], note: ["soft", "Note"], ok: ["good", "Fine"] };
-
-// state: of /api/state.
-export function followWires(state) {
-  const { flight_controller: board, state: line, speed_baud: speed } = state.link;
-  setText(byId("wires"), `Wiring: ${state.port.trouble || (board === null ? evidence(state.traffic.fc) : `${board} answers${speed ? ` at ${speed} baud` : ""} (${line}).`)}`);
-}
 
 const result = resultPlace(), findings = make("div", { id: "findings" });
 byId("doctor").append(make("div", { class: "row" }, action("Check everything", result, examine, "primary"), result), findings);

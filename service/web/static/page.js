@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The tasks, and the loop: asks for the state once a second while the page is visible, and for the rest when it changes.
-import { followWires } from "./check.js";
+import "./check.js";
 import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
 import { showConnect, showValues } from "./fly.js";
@@ -51,7 +51,6 @@ async function look() {
     showParts();
     showStateBar(state, null);
     showValues(state);
-    followWires(state);
     followTiles(state);
     followWrites(state, askedAt);
     followFile(state);

@@ -79,7 +79,6 @@ def test_first_questions_remedies_settings_and_log(browsers: Browsers, bench: tu
         opened(page, web)
         console(pi)
         page.show("check")
-        page.wait_text("#wires", "answers at 115200 baud")
         press(page, "Check everything")
         page.wait_text("#findings", "Problem console")
         assert fits_a_phone(page)
