@@ -82,10 +82,8 @@ class CompassCheck:
         automatic = table.find(_AUTOMATIC)
         if place is None or health is None or Sensor.COMPASS not in health.sensors:
             return None
-        if setting is None or isinstance(setting.value, str) or (automatic is not None and automatic.value):
-            return None
         here_deg = declination_deg(place.lat_e7 / 1e7, place.lon_e7 / 1e7)
-        if here_deg is None:
+        if here_deg is None or setting is None or isinstance(setting.value, str) or (automatic and automatic.value):
             return None
         # 100 times the degrees, plus the minutes.
         minutes, degrees = math.modf(setting.value / 100)

@@ -24,8 +24,6 @@ _HEADER = b"$M<"
 #: Exactly two requests: noise cannot produce that.
 _EVIDENCE = 10
 _FRAMES_KEPT = 64
-#: Bytes that are kept of what was heard: the prompt, and requests of which half are not echoed.
-_HEARD_KEPT = 16
 #: Erases the longest line that can be typed: 64 characters on INAV, 48 on Harakiri.
 RUB_OUT_LINE = _DEL * 64
 
@@ -52,11 +50,10 @@ class EchoWatch:
         self._heard = b""
 
     def feed(self, data: bytes) -> None:
-        self._heard = (self._heard + data)[-_HEARD_KEPT:]
+        self._heard = (self._heard + data)[-_EVIDENCE - len(PROMPT) :]
 
     def is_echo(self, size: int = _EVIDENCE) -> bool:
         """True if the last `size` bytes are our own requests, with a header, or a header follows Harakiri's prompt."""
-        # A reply may quote a request's text.
-        tail = self._heard[-size:]
+        tail = self._heard[-size:]  # a reply may quote a request's text, but not two
         is_sent = len(tail) == size and _HEADER in tail and tail in _printable(b"".join(self.sent))
         return is_sent or PROMPT + _HEADER in self._heard
