@@ -134,7 +134,7 @@ def _opens_to_read(call: ast.Call) -> bool:
     return str(modes[0]).startswith("r") if modes else is_builtin and len(call.args) == 1
 
 
-def test_foreign_bytes_become_text_at_one_door() -> None:
+def test_foreign_bytes_are_decoded_in_one_module() -> None:
     """`protocols.plain_text`, and `file_text` for whole files: text from elsewhere could hold what a terminal obeys."""
     decoders = {file for file, name, call in calls(*INSTALLED) if name == "decode" and _decodes_bytes(call)}
     assert decoders - {"protocols/file_text.py", "protocols/plain_text.py"} == DECODERS.keys()
@@ -170,7 +170,7 @@ def test_the_terminal_gets_text_and_never_markup() -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_imports_between_packages_go_one_way(package: str) -> None:
+def test_imports_between_packages_have_one_direction(package: str) -> None:
     allowed = tuple(f"{each}." for each in (package, *PACKAGES[package]))
     ours = tuple(f"{each}." for each in PACKAGES)
     found = [(file, name) for file, name in imports(REPOSITORY / package) if f"{name}.".startswith(ours)]

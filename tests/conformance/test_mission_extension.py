@@ -287,7 +287,7 @@ def test_the_radius_is_set_saved_and_bounded(fc: Companion) -> None:
     assert fc.info().wp_radius_cm == 2000
 
 
-def test_malformed_requests_change_nothing(fc: Companion) -> None:
+def test_malformed_requests_have_no_effect(fc: Companion) -> None:
     fc.begin(identify(NEW))
     fc.chunk(NEW, 0, 1)
     before = fc.info()

@@ -174,7 +174,7 @@ def test_a_command_of_naze_bridge_works(sandbox: Sandbox, command: Command, monk
 
 
 @pytest.mark.parametrize("command", [each for each in COMMANDS if each not in OWN], ids=lambda command: command.text)
-def test_a_command_of_another_program_names_what_exists(command: Command) -> None:
+def test_a_command_of_another_program_names_existing_files(command: Command) -> None:
     assert reason_not_to_run(command), "run it, or add it to NOT_RUN"
     program, *words = command.words
     if program == "make" and "~" not in command.text:

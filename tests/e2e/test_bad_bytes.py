@@ -151,7 +151,7 @@ def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
 # -- strangers -----------------------------------------------------------------------------------------------
 
 
-def test_messages_for_others_change_nothing(shared: Bench, kept: list[str]) -> None:
+def test_messages_for_others_are_ignored(shared: Bench, kept: list[str]) -> None:
     m = messages
     with udp_station(shared.daemon.address) as station:
         station.send_heartbeat()

@@ -47,7 +47,7 @@ def assert_retry_works(bench: Bench, planner: MissionPlanner) -> None:
 
 # Writing the first list, in a blank slot, and writing the second.
 @pytest.mark.parametrize("operation", [2, 106])
-def test_a_power_cut_while_a_list_is_written_keeps_the_old_one(
+def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(
     bench: Bench, planner: MissionPlanner, operation: int
 ) -> None:
     bench.board.set(f"power_cut_at_flash_operation {operation}")

@@ -85,7 +85,7 @@ async def test_a_write_while_armed_is_refused(core: tuple[Bench, Path]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-async def test_a_power_cut_while_a_list_is_written_keeps_the_old_one(start: Starter, seed: int) -> None:
+async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: Starter, seed: int) -> None:
     bench, flash = start_on_core(start)
     bench.daemon.push(OLD)
     cut = random.Random(seed).randint(1, NEW_OPERATIONS)

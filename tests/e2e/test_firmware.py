@@ -107,7 +107,7 @@ def test_without_a_daemon_a_battery_is_noticed_before_the_first_change(start: St
     assert not board.stats()["bootloader_entered"]
 
 
-def test_an_armed_board_and_one_with_a_battery_are_refused_and_not_touched(flashing: FlashingBench) -> None:
+def test_armed_boards_and_boards_with_a_battery_are_refused_untouched(flashing: FlashingBench) -> None:
     bench = flashing.bench
     until(lambda: (bench.daemon.status() or {}).get("battery_v"), "the battery's voltage")
     status, said = flashing.flash("flash", str(flashing.image))

@@ -49,7 +49,7 @@ def test_every_kind_of_link_works_at_once(start: Starter) -> None:
     until(lambda: len(bench.daemon.ground_stations()) == 3, "the end of the TCP connection")
 
 
-def test_a_tcp_client_that_disconnects_during_an_upload_blocks_no_one(start: Starter) -> None:
+def test_a_tcp_client_that_disconnects_during_an_upload_does_not_block_others(start: Starter) -> None:
     port = free_port(socket.SOCK_STREAM)
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
     plan = plain_plan(30)
@@ -134,7 +134,7 @@ def test_a_download_is_consistent_during_an_upload(shared: Bench) -> None:
     assert [item.x for item in reader.read()] == [item.lat_e7 for item in judge(new).items]
 
 
-def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
+def test_all_stations_get_the_result_of_an_upload(shared: Bench) -> None:
     writer, other = shared.mission_planner(), shared.mission_planner()
     other.wait_for_vehicle()
     writer.write(plain_plan(13, start=60))
@@ -142,7 +142,7 @@ def test_all_stations_are_told_the_result_of_an_upload(shared: Bench) -> None:
     other.wait_until(lambda: 12 in [message.total for message in other.messages("MISSION_CURRENT")], "the new total")
 
 
-def test_many_earlier_stations_do_not_lock_out_a_new_one(bench: Bench) -> None:
+def test_many_earlier_stations_do_not_lock_out_a_new_station(bench: Bench) -> None:
     for _ in range(40):
         with udp_station(bench.daemon.address) as passer_by:
             passer_by.send_heartbeat()

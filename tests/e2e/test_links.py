@@ -106,7 +106,7 @@ def test_links_on_ipv6_and_on_a_host_name_work(start: Starter) -> None:
     assert bench.board.records() == records_of(judge(PLAN))
 
 
-def test_a_client_that_does_not_read_delays_no_one(start: Starter) -> None:
+def test_a_client_that_does_not_read_does_not_delay_others(start: Starter) -> None:
     port, udp = free_port(socket.SOCK_STREAM), free_port()
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{udp}"])
     with tcp_station(port) as deaf, tcp_station(port) as station, udp_station(("127.0.0.1", udp)) as by_udp:

@@ -140,7 +140,7 @@ async def test_a_list_is_written_and_read_over_a_bad_link(shared: Bench, kept: l
     assert link.lost
 
 
-async def test_refused_lists_keep_the_old_one(shared: Bench) -> None:
+async def test_a_refused_list_keeps_the_old_mission(shared: Bench) -> None:
     async with vehicle_at(shared.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
@@ -232,7 +232,7 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     ]
 
 
-async def test_the_mission_plugin_cannot_read_what_an_ardupilot_sends(shared: Bench, kept: list[str]) -> None:
+async def test_the_mission_plugin_cannot_read_an_ardupilots_list(shared: Bench, kept: list[str]) -> None:
     """It takes only waypoints of a relative frame, and home has frame 0; `mission_raw` reads the list."""
     async with vehicle_at(shared.daemon.port) as vehicle:
         with pytest.raises(MissionError) as refused:

@@ -368,7 +368,7 @@ def test_cancel_keeps_the_old_list(shared: Bench, kept: list[str]) -> None:
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_an_abandoned_upload_blocks_no_one(shared: Bench, kept: list[str]) -> None:
+def test_an_abandoned_upload_does_not_block_others(shared: Bench, kept: list[str]) -> None:
     gone = shared.mission_planner()
     gone.write_begun(plain_plan(30, start=100), 9)
     planner = shared.mission_planner()

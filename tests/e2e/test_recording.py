@@ -154,7 +154,7 @@ def test_a_second_start_begins_a_second_log(start: Starter, connect: Connect) ->
         daemon.kill_and_restart()
 
 
-def test_unwritable_logs_are_reported_once_and_delay_nothing(start: Starter, connect: Connect) -> None:
+def test_unwritable_logs_are_reported_once_without_delay(start: Starter, connect: Connect) -> None:
     (start.directory / "state").mkdir()
     (start.directory / "state" / "logs").write_text("in the way")
     daemon = start.daemon("sim:")
@@ -194,7 +194,7 @@ def test_recording_can_be_switched_off(start: Starter, connect: Connect) -> None
     assert logs_of(daemon) == []
 
 
-def test_other_users_cannot_read_what_a_daemon_run_by_hand_stores(
+def test_other_users_cannot_read_the_files_of_a_daemon_run_by_hand(
     start: Starter, connect: Connect, tmp_path: Path
 ) -> None:
     before = os.umask(0o022)

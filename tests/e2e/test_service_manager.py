@@ -109,7 +109,7 @@ def test_a_second_signal_does_not_wait(start: Starter) -> None:
     assert "Traceback" not in bench.daemon.printed
 
 
-def test_a_ground_station_is_told_of_the_stop(start: Starter) -> None:
+def test_a_ground_station_is_informed_of_the_stop(start: Starter) -> None:
     """Its upload is refused with the reason."""
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:

@@ -230,7 +230,7 @@ def test_a_change_of_a_file_that_the_patch_relies_on_is_reported(clone: Workshop
     assert "relying on, files with changes of your own: src/mw.h" in printed
 
 
-def test_conflicts_are_named_by_file_and_line_and_nothing_is_applied(clone: Workshop) -> None:
+def test_conflicts_are_named_by_file_and_line_and_the_tree_is_unchanged(clone: Workshop) -> None:
     main = clone.tree / "src" / "main.c"
     main.write_bytes(b"/* mine */\n\n" + MAIN + LONG)
     (clone.tree / "src" / "util.c").write_bytes(UTIL + b"int four(void);\n")

@@ -156,7 +156,7 @@ def test_a_name_that_is_not_a_members_is_refused_and_does_not_change_anything(en
     assert files() == before
 
 
-def test_a_wrong_and_a_missing_login_are_told_apart(enrolled: Enrolled, tmp_path: Path) -> None:
+def test_a_wrong_and_a_missing_login_are_distinguished(enrolled: Enrolled, tmp_path: Path) -> None:
     config = json.loads((enrolled.folder / "pilot.json5").read_text())
     config["transport"]["auth"]["usrpwd"]["password"] += "?"
     wrong = tmp_path / "wrong.json5"

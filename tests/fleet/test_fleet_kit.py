@@ -27,7 +27,7 @@ _LATER = {"naze_bridge_missions_total", "naze_bridge_refused_frames_total", "naz
 
 
 @pytest.mark.parametrize("file", ["docker-compose.yml", "docker-compose.history.yml"])
-def test_the_storages_keep_what_they_should_and_no_telemetry(file: str) -> None:
+def test_the_storages_keep_state_and_events_without_telemetry(file: str) -> None:
     compose = (EXAMPLES / "fleet" / file).read_text()
     stored = [zenoh.KeyExpr(found) for found in re.findall(r'key_expr:"([^"]+)"', compose)]
 

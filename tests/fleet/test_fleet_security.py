@@ -121,7 +121,7 @@ def test_a_vehicle_cannot_impersonate_another(secured: Fleet) -> None:
         assert [key.split("/")[1] for key in tokens] == ["naze-2"]
 
 
-def test_a_stranger_with_a_certificate_may_do_nothing(tls: Fleet) -> None:
+def test_a_stranger_with_a_certificate_has_no_rights(tls: Fleet) -> None:
     with ExitStack() as stack:
         vehicle = stack.enter_context(tls.open("vehicle", "naze-1"))
         fake_bridge(stack, vehicle, "naze-1")

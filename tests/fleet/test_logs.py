@@ -73,7 +73,7 @@ def test_a_vehicle_without_logs_is_reported_as_such(fleet: Fleet) -> None:
     assert (listed.returncode, listed.stdout, listed.stderr) == (0, "", "jay has no telemetry logs\n")
 
 
-def test_what_cannot_be_fetched_is_reported_in_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
+def test_an_unavailable_log_is_reported_in_one_sentence(fleet: Fleet, tmp_path: Path) -> None:
     unknown = fleet.ask("logs", "--vehicle", "kite", "2020-01-01 00-00-00.tlog", "--folder", tmp_path)
     assert (unknown.returncode, "kite has no log '2020-01-01 00-00-00.tlog'" in unknown.stderr) == (1, True)
     closed = fleet.ask("logs", "--vehicle", "owl")

@@ -23,5 +23,5 @@ def test_single_precision_is_not_a_difference() -> None:
     assert variants([held("a", "X 1", p=0.1), held("b", "X 1", p=0.10000000149011612)]) == {}
 
 
-def test_without_vehicles_nothing_differs() -> None:
+def test_without_vehicles_there_are_no_differences() -> None:
     assert variants([]) == {}

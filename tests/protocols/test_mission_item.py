@@ -20,7 +20,7 @@ def test_a_number_that_is_not_finite_is_missing(degrees: float) -> None:
     assert degrees_to_e7(degrees) is None
 
 
-def test_the_poles_and_the_date_line_are_on_earth_and_nothing_beyond() -> None:
+def test_places_beyond_the_poles_and_the_date_line_are_refused() -> None:
     for sign in (-1, 1):
         assert is_on_earth(sign * 900_000_000, sign * 1_800_000_000)
         assert not is_on_earth(sign * (900_000_000 + 1), 0)

@@ -49,7 +49,7 @@ def test_reads_set_lines_as_inavs_command_line_does(line: bytes) -> None:
         ),
     ],
 )
-def test_refuses_what_it_cannot_read_with_the_line(text: bytes, why: str) -> None:
+def test_refuses_unreadable_lines_with_their_number(text: bytes, why: str) -> None:
     with pytest.raises(FileError, match=why):
         read_settings_file(text, "dump")
 

@@ -75,7 +75,7 @@ def test_a_long_write_broken_off_is_ended(cut: int) -> None:
     assert again.run(session(b"fedcba9876543210")) == b"fedcba9876543210"
 
 
-def test_without_a_boot_loader_nothing_is_found() -> None:
+def test_a_missing_boot_loader_is_not_found() -> None:
     board = board_in_boot_loader()
     board.power_off(0.0)
     waiting: list[bool] = []

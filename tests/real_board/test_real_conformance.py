@@ -24,7 +24,7 @@ from tests.conformance.test_mission_extension import (  # noqa: F401  (collected
     test_commit_of_records_other_than_announced_is_a_checksum_error,
     test_failing_flash_leaves_the_old_list,
     test_info_has_limits_and_state,
-    test_malformed_requests_change_nothing,
+    test_malformed_requests_have_no_effect,
     test_more_records_than_the_capacity_are_refused_with_no_space,
     test_other_commands_are_left_to_the_firmware,
     test_reading_past_the_end_is_out_of_range,

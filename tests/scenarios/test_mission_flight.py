@@ -192,7 +192,7 @@ def test_disarming_in_the_air_does_not_complete_anything() -> None:
 
 
 @pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
-def test_nothing_old_is_shown_when_the_reports_end(tele_prot: TelemetryProtocol) -> None:
+def test_old_values_are_not_shown_when_the_reports_end(tele_prot: TelemetryProtocol) -> None:
     flight = Flight(tele_prot)
     flight.reports(replace(LEG, record=2, reached=1))
     assert flight.mode == AUTO
@@ -306,7 +306,7 @@ def test_the_limits_of_the_flight_are_read_from_the_board_by_name() -> None:
 
 
 @pytest.mark.parametrize("tele_prot", [MSP, MAVLINK])
-def test_what_the_core_decides_is_logged(tele_prot: TelemetryProtocol) -> None:
+def test_decisions_of_the_core_are_logged(tele_prot: TelemetryProtocol) -> None:
     flight = Flight(tele_prot)
     held = replace(LEG, state=FlightPhase.HELD, reason=FlightReason.FIX_LOST, record=2)
     flight.reports(LEG)
@@ -315,7 +315,7 @@ def test_what_the_core_decides_is_logged(tele_prot: TelemetryProtocol) -> None:
     assert [message.value for message in messages] == [LEG.summary, held.summary]
 
 
-def test_the_state_tells_why_a_flight_has_stopped() -> None:
+def test_the_state_reports_why_a_flight_has_stopped() -> None:
     flight = Flight()
     flight.reports(replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STALLED))
     mission = flight.world.bridge.report(flight.world.now).mission

@@ -162,7 +162,7 @@ class TestLostFlightController:
             assert glance.qgc == "Ready"
             assert glance.qgc_reason in ("PreArm: ready", "")
 
-    def test_in_flight_it_stays_and_nothing_else_is_shown(self) -> None:
+    def test_in_flight_only_the_failsafe_is_shown(self) -> None:
         world, _, screens = on_the_ground()
         world.faults.armed = True
         world.run(20)
@@ -347,7 +347,7 @@ class TestWritingMissions:
         assert station.texts()[-1].startswith("9 of 9 stored: check home")
 
     @pytest.mark.parametrize("radius_cm", [3000.0, 199.949])
-    def test_what_follows_a_write_does_not_raise_an_error(self, radius_cm: float) -> None:
+    def test_requests_after_a_write_do_not_raise_an_error(self, radius_cm: float) -> None:
         """Its default radius of 30 m, or 6.56 ft for 2 m; 10 s later PREFLIGHT_STORAGE, perhaps in flight."""
         world, station, screens = on_the_ground()
         assert Upload(station, waypoints(9)).run() is MissionResult.ACCEPTED
@@ -395,7 +395,7 @@ class TestRestart:
         assert not any(glance.failsafe for glance in screens.look())
 
 
-def test_a_mission_of_an_inav_is_told_in_the_words_of_the_osd() -> None:
+def test_an_inav_mission_is_reported_in_the_osds_words() -> None:
     """QGroundControl says them; the HUD of Mission Planner stays free for what has gone wrong."""
     world, station, screens = inav()
     home = world.bridge.vehicle.home

@@ -46,7 +46,7 @@ def first_line(daemon: subprocess.Popen[str]) -> str:
     return daemon.stdout.readline().strip()
 
 
-def test_the_second_daemon_is_told_the_first_ones_process_id(tmp_path: Path) -> None:
+def test_the_second_daemon_gets_the_process_id_of_the_first(tmp_path: Path) -> None:
     directory = tmp_path / "state"
     with start(directory) as first:
         assert first_line(first) == "1"

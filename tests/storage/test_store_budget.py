@@ -19,7 +19,7 @@ def test_a_full_store_loses_rejected_lists_first(tmp_path: Path) -> None:
     assert (tmp_path / "missions.db").stat().st_size < 2 << 20
 
 
-def test_a_full_store_keeps_a_failed_list_longer_than_newer_rejected_ones(tmp_path: Path) -> None:
+def test_a_full_store_keeps_a_failed_list_longer_than_rejected_lists(tmp_path: Path) -> None:
     with open_store(tmp_path / "missions.db", 0.0, budget=1 << 20).store as store:
         failed = store.add(mission(1))
         store.conclude(failed, "FAILED", "", 1.0)

@@ -88,7 +88,7 @@ def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
     assert multiwii.writes == written + 2
 
 
-def test_only_some_records_are_read_to_see_that_nobody_changed_the_list() -> None:
+def test_only_some_records_are_read_to_notice_changes() -> None:
     multiwii = FakeMultiwii()
     world, station = found(multiwii)
     assert Upload(station, plan(40)).run() is ACCEPTED

@@ -146,7 +146,7 @@ def test_a_consumption_is_not_renewed_by_the_voltage() -> None:
     assert (power.voltage_v, power.drawn_mah) == (12.6, None)
 
 
-def test_without_a_fix_a_repeated_place_is_not_a_position_but_the_height_is_one() -> None:
+def test_without_a_fix_the_height_is_current_but_not_the_place() -> None:
     world, autopilot, _ = passing()
     where = m.MAVLink_global_position_int_message(1, 453838000, 84733000, 131000, 20000, 0, 0, 0, 9000)
     autopilot.send(m.MAVLink_gps_raw_int_message(1, 1, 0, 0, 0, 120, 65535, 65535, 65535, 3))
@@ -157,7 +157,7 @@ def test_without_a_fix_a_repeated_place_is_not_a_position_but_the_height_is_one(
 
 
 @given(st.data())
-def test_arbitrary_contents_of_an_intact_frame_raise_nothing(data: st.DataObject) -> None:
+def test_arbitrary_contents_of_an_intact_frame_do_not_raise(data: st.DataObject) -> None:
     """As from a faulty autopilot."""
     world, autopilot, _ = passing()
     autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3))

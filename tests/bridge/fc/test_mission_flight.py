@@ -82,7 +82,7 @@ def test_a_compass_error_is_said_once(compass: float | None, why: str) -> None:
 
 
 @pytest.mark.parametrize("payload", [b"", b"\x0b" + bytes(25), b"\0\x09" + bytes(24), encode_flight(FLYING)[:-1]])
-def test_other_replies_change_nothing(payload: bytes) -> None:
+def test_other_replies_are_ignored(payload: bytes) -> None:
     vehicle = Vehicle()
     hear_msp(vehicle, MspFrame(Direction.REPLY, FLIGHT, payload), FlightController(PATCHED, PATCHED.name), 0.0)
     assert vehicle.last(MissionLeg) is None

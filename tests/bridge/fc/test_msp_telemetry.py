@@ -185,7 +185,7 @@ def test_telemetry_continues_alongside_a_mission(baud: int) -> None:
     world.assert_line_was_clean()
 
 
-def test_noise_gives_neither_telemetry_nor_a_flight_controller() -> None:
+def test_noise_does_not_become_telemetry_or_a_flight_controller() -> None:
     world, station = flown(3)
     world.power_off()
     world.run(0.5)

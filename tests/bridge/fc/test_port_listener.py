@@ -61,7 +61,7 @@ def test_a_damaged_sentence_is_not_enough() -> None:
 
 
 @given(st.lists(st.binary(max_size=64), max_size=20))
-def test_noise_neither_raises_nor_is_a_radio(chunks: list[bytes]) -> None:
+def test_noise_is_not_a_radio_and_does_not_raise(chunks: list[bytes]) -> None:
     watch = PortListener(0.0)
     for chunk in chunks:
         watch.receive(chunk)
@@ -133,7 +133,7 @@ def test_it_is_heard_wherever_a_read_ends(whole: bytes, name: str, before: str, 
 
 @KINDS
 @given(at=st.integers(1, 1000), bit=st.integers(0, 7))
-def test_a_damaged_one_is_not_heard(whole: bytes, name: str, at: int, bit: int) -> None:
+def test_a_damaged_sentence_is_not_heard(whole: bytes, name: str, at: int, bit: int) -> None:
     data = bytearray(whole.rstrip(b"\r\n"))
     data[at % len(data)] ^= 1 << bit
     assert heard(bytes(data)) == ""

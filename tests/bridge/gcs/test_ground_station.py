@@ -41,7 +41,7 @@ def close_link(world: World, peer: Peer) -> None:
 
 
 @pytest.mark.parametrize("leave", [fall_silent, disconnect, close_link])
-def test_nothing_remembers_hundreds_of_stations_that_have_left(leave: Callable[[World, Peer], None]) -> None:
+def test_hundreds_of_stations_that_have_left_are_forgotten(leave: Callable[[World, Peer], None]) -> None:
     world = ready_world()
     gc.collect()
     before = [each for each in gc.get_objects() if type(each) in (GcsStation, Peer)]

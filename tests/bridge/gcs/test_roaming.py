@@ -115,7 +115,7 @@ def test_requests_follow_a_station_that_only_sends_items() -> None:
     assert world.stored == records_of(PLAN)
 
 
-def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
+def test_an_upload_restarted_from_a_new_address_replaces_the_old_upload() -> None:
     for count in (40, 30):
         world = ready_world()
         roamer = Roamer(world)
@@ -129,7 +129,7 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_one() -> None:
         assert world.stored == records_of(plan)
 
 
-def test_a_restarted_station_is_not_asked_for_items_of_its_previous_list() -> None:
+def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list() -> None:
     """Its item 0 would complete the previous list of one item, and its own list would get that list's refusal."""
     world = ready_world()
     roamer = Roamer(world)

@@ -186,7 +186,7 @@ def test_a_command_for_another_vehicle_needs_a_proven_station(kind: str) -> None
 
 
 @pytest.mark.parametrize("sysid", [1, 42], ids=["our own ids", "others"])
-def test_our_own_signed_answers_prove_nothing(sysid: int) -> None:
+def test_our_own_signed_answers_are_not_a_proof(sysid: int) -> None:
     """A stranger collects what the bridge signed, also in the autopilot's name, and sends it back."""
     links = {"one": LinkAccess(signing(), 1)}
     links["two"] = LinkAccess(links["one"].signing, 2)

@@ -179,7 +179,7 @@ def asked_again(message: Send) -> MspLink:
     return link
 
 
-def test_a_late_reply_is_neither_timed_nor_counted_twice() -> None:
+def test_a_late_reply_is_not_timed_or_counted_twice() -> None:
     link = asked_again(question(101, 11))
     before = link.round_trip_s
     link.receive(reply(101, 11), 0.201)

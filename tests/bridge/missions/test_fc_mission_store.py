@@ -143,7 +143,7 @@ def test_writing_a_read_list_again_does_not_change_anything(craft: Craft) -> Non
     assert (after.records, after.items[1:]) == (before.records, before.items[1:])
 
 
-def test_a_new_list_replaces_the_old_one(craft: Craft) -> None:
+def test_a_new_list_replaces_the_old_list(craft: Craft) -> None:
     for count, seed in ((20, 1), (5, 2), (9, 3)):
         assert craft.upload(craft.plan(count, seed)) is ACCEPTED
         assert craft.holds(craft.plan(count, seed))

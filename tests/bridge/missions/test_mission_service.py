@@ -69,7 +69,7 @@ def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
     assert world.store.outcomes() == [outcome]
 
 
-def test_other_stations_hear_of_a_list_only_if_it_is_a_new_one() -> None:
+def test_other_stations_hear_only_of_new_lists() -> None:
     """A station that timed out may write the same list again."""
     world = World(speeds=(115200,), flash=OLD_FLASH)
     world.wait_ready()

@@ -163,7 +163,7 @@ def test_without_memory_the_mode_is_a_guess() -> None:
     assert world.bridge.vehicle.home is None
 
 
-def test_a_landing_that_nobody_saw_ends_the_flight() -> None:
+def test_an_unseen_landing_ends_the_flight() -> None:
     world, station, screens = flying(TelemetryProtocol.MAVLINK_57600)
     placed = home(station)
     world.at(world.now + 1.0, lambda: setattr(world.faults, "armed", False))

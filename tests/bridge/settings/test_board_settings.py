@@ -122,7 +122,7 @@ def test_telemetry_keeps_four_fifths_of_the_rate_while_the_list_is_read(kind: st
         ("baseflight", "MIN_COMMAND", 1400),
     ],
 )  # fmt: skip
-def test_nothing_that_could_arm_or_spin_or_crash_is_set(board: str, name: str, value: Value) -> None:
+def test_settings_that_could_arm_spin_or_crash_are_refused(board: str, name: str, value: Value) -> None:
     world, client = ready(BOARDS[board])
     before = client.value(name)
     result = client.change(name, value)
@@ -165,7 +165,7 @@ def test_while_a_mission_arrives_it_does_not_change_anything() -> None:
     assert cause_of(client.save()) is Cause.OCCUPIED
 
 
-def test_nothing_is_known_without_a_board() -> None:
+def test_settings_are_unknown_without_a_board() -> None:
     world = World(powered=False)
     client = SettingsClient(world)
     assert cause_of(client.change("p_roll", 40)) is Cause.NO_LINK

@@ -193,7 +193,7 @@ def test_a_change_between_two_runs_is_reported() -> None:
     assert again.events("settings.changed_on_board") == []
 
 
-def test_a_station_that_connects_later_is_told_until_the_craft_is_armed() -> None:
+def test_a_station_that_connects_later_is_informed_until_arming() -> None:
     world, _ = sealed(naze)
     on_the_board(world, SettingCommand.SET_SETTING, set_setting("p_roll", 65))
     world.run(ROUND_S)

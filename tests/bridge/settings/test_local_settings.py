@@ -202,7 +202,7 @@ def test_another_clients_change_in_the_middle_prevents_the_save() -> None:
     assert "p_roll has another value" in result.text
 
 
-def test_the_plan_from_memory_asks_the_board_nothing() -> None:
+def test_the_plan_from_memory_does_not_ask_the_board() -> None:
     world, client = ready(BOARDS[NAZE])
     client.wait_read()
     found: list[object] = []
@@ -240,7 +240,7 @@ def plan(wanted: dict[str, Value], source: str = BOARD, table: SettingTable = TA
     return found
 
 
-def test_only_what_differs_is_written() -> None:
+def test_only_differences_are_written() -> None:
     found = plan({"p_roll": 40.0, "cf": 0.1, "name": "kite"})
     assert found.changes == (PlannedChange("p_roll", 35, 40.0),)
     assert (found.left_out, found.notice) == ((), "")

@@ -414,7 +414,7 @@ def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:
     assert {each.param_count for each in received} == {ALL}
 
 
-def test_a_station_with_a_shorter_list_gets_the_whole_one_when_it_is_known() -> None:
+def test_a_station_with_a_shorter_list_gets_the_whole_list_later() -> None:
     world = World(powered=False, speeds=(115200,))
     station = GroundStation(world)
     station.stay_connected()

@@ -82,7 +82,7 @@ def test_values_in_flight_are_the_boards_last() -> None:
     assert world.now - asked_at < 1
 
 
-def test_in_flight_nothing_else_reaches_the_line() -> None:
+def test_in_flight_other_requests_do_not_reach_the_line() -> None:
     world = ready("inav")
     arm(world)
     programs = [ShareProgram(world, f"192.0.2.{host}:1", may_write=True) for host in range(3)]

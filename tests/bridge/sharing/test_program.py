@@ -117,7 +117,7 @@ def requests_written(world: World, *commands: int) -> int:
     return sum(frame.command in commands for frame in frames)
 
 
-def test_the_replies_of_polls_cost_the_line_nothing() -> None:
+def test_the_replies_of_polls_do_not_use_the_line() -> None:
     world, station = flying_station("harakiri")
     world.written.clear()
     world.run(10)

@@ -74,7 +74,7 @@ def answer(world: World, command: int, payload: bytes, *, is_v2: bool = False) -
 
 
 @given(command=st.sampled_from(COMMANDS), payload=st.binary(max_size=255))
-def test_a_read_is_one_on_every_firmware_that_may_be_on_the_line(command: int, payload: bytes) -> None:
+def test_a_permitted_read_reads_on_every_possible_firmware(command: int, payload: bytes) -> None:
     """Only what is known of the firmware adds to the rights of an unknown one."""
     unknown = MSP_RIGHTS[Firmware.UNKNOWN].get(command)
     if unknown is not None and unknown.effect_of(payload) is Effect.READ:

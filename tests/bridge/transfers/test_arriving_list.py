@@ -200,7 +200,7 @@ def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
     assert world.stored == records_of(items)
 
 
-def test_items_out_of_order_are_kept_and_the_missing_one_is_requested() -> None:
+def test_items_out_of_order_are_kept_and_missing_items_requested() -> None:
     world, station = holding()
     items = waypoints(8)
     receiving(world, station, items, 0)

@@ -789,7 +789,7 @@ def test_a_reason_is_sent_once_per_attempt() -> None:
     assert other.texts() == []
 
 
-def test_other_stations_are_told_of_a_clear() -> None:
+def test_other_stations_hear_of_a_clear() -> None:
     world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     other.send(ack_message(A.ACCEPTED))
@@ -856,7 +856,7 @@ def test_uploads_over_a_bad_radio_link_are_exact_or_refused() -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.02, 0.2])
-def test_late_wake_ups_lose_nothing(late_s: float) -> None:
+def test_late_wake_ups_do_not_lose_items(late_s: float) -> None:
     for seed in range(4):
         world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH, late_s=late_s)
         world.wait_ready()

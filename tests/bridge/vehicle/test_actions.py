@@ -78,7 +78,7 @@ def test_an_action_is_done_once_on_the_ground(
     assert done(world) == [action]
 
 
-def test_storing_saves_what_may_be_unsaved_and_is_silent_after_that() -> None:
+def test_storing_saves_unsaved_settings_and_is_then_silent() -> None:
     """Mission Planner asks for it by itself, 10 s after any PARAM_SET."""
     world, station = a_world()
     operations = []
@@ -106,7 +106,7 @@ def test_storing_while_armed_is_acknowledged_silently() -> None:
 
 
 @pytest.mark.parametrize("what", [0, 2, math.nan, math.inf])
-def test_settings_are_neither_loaded_nor_reset(what: float) -> None:
+def test_settings_are_not_loaded_or_reset(what: float) -> None:
     world, station = a_world()
     station.send(long(STORAGE, (what, 0, 0, 0, 0, 0, 0)))
     world.run(0.3)

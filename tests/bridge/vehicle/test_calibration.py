@@ -220,7 +220,7 @@ def test_the_usual_time_counts_from_the_boards_reply() -> None:
     assert times["MAG_CAL_REPORT"] - times["COMMAND_ACK"] >= 31.0
 
 
-def test_what_a_board_cannot_do_says_so() -> None:
+def test_an_unsupported_calibration_is_refused_with_a_text() -> None:
     pages = CalibrationPages(FakeInav())
     pages.start_accelerometer(WIZARD)
     pages.world.run(0.5)

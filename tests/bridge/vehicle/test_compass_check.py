@@ -53,7 +53,7 @@ def test_a_wrong_declination_is_reported_once_until_it_is_set() -> None:
 
 
 @pytest.mark.parametrize("armed", [False, True])
-def test_a_craft_that_moves_is_not_told_again(armed: bool) -> None:
+def test_the_compass_warning_is_not_repeated_while_the_craft_moves(armed: bool) -> None:
     faults = Faults()
     world, client = ready(BOARDS["patched Harakiri"], faults)
     station = GroundStation(world)

@@ -235,7 +235,7 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
 
 
 @pytest.mark.parametrize("was_right", [False, True])
-def test_a_station_is_told_that_the_clock_is_wrong(*, was_right: bool) -> None:
+def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
     world = keyed()
     station, right = signing_station(world), signing_station(world, "right clock", sysid=254)
     if was_right:

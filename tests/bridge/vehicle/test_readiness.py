@@ -84,7 +84,7 @@ STATES: dict[str, tuple[Callable[[], World], Told]] = {
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_every_client_is_told_the_same(name: str) -> None:
+def test_every_client_gets_the_same_state(name: str) -> None:
     make, expected = STATES[name]
     world = make()
     station = GroundStation(world)

@@ -194,7 +194,7 @@ def test_the_return_home_is_not_left() -> None:
     assert len(flight.sent()) == 1
 
 
-def test_a_landing_goes_on_and_nothing_takes_off_after_it() -> None:
+def test_a_landing_goes_on_without_a_new_take_off() -> None:
     flight = Flight([*MISSION[:2], leg(90, Command.NAV_LAND)]).begin()
     flight.world.run_until(lambda _: flight.status.state == NavState.LAND_IN_PROGRESS, 120)
     flight.ask(long(1))
@@ -229,7 +229,7 @@ def test_older_versions_refuse_it(version: str) -> None:
     assert flight.number == 1
 
 
-def test_only_one_request_runs_at_a_time_and_a_repeated_one_is_not_sent_again() -> None:
+def test_only_one_request_runs_at_a_time_and_repeats_are_not_sent() -> None:
     flight = Flight().begin()
     for seq in (3, 3, 6):
         flight.station.send(long(seq))
@@ -239,7 +239,7 @@ def test_only_one_request_runs_at_a_time_and_a_repeated_one_is_not_sent_again() 
     assert "Set WP: another request is running, try again" in flight.station.texts()
 
 
-def test_a_client_that_repeats_the_request_at_each_other_item_gets_none() -> None:
+def test_a_client_that_repeats_the_request_does_not_get_another_item() -> None:
     """MAVSDK, which requests no streams."""
     flight = Flight().begin()
     flight.world.run_until(lambda _: bool(flight.current()), 2)

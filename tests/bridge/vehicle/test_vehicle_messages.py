@@ -90,7 +90,7 @@ def test_without_readings_there_are_no_messages() -> None:
             assert at(Vehicle()).made(row.maker) == []
 
 
-def test_errors_and_short_replies_change_nothing() -> None:
+def test_errors_and_short_replies_are_ignored() -> None:
     state = Vehicle()
     for poll in Msp:
         hear_msp(state, MspFrame(Direction.ERROR, poll, bytes(40)), HARAKIRI, 0.0)
@@ -100,7 +100,7 @@ def test_errors_and_short_replies_change_nothing() -> None:
 
 @pytest.mark.parametrize("fill", [0x00, 0x01, 0x7F, 0x80, 0xFF])
 @pytest.mark.parametrize("profile", [each for each in PROFILES if each.spoken is Spoken.MSP], ids=lambda it: it.name)
-def test_every_message_can_be_packed_whatever_a_board_replies(profile: Profile, fill: int) -> None:
+def test_every_message_can_be_packed_for_any_reply(profile: Profile, fill: int) -> None:
     who = FlightController(profile, profile.name, None, HARAKIRI_BOXES)
     state = with_replies(Vehicle(), who, **{poll.name: bytes((fill,)) * 68 for poll in Msp if poll is not Msp.BOX})
     for row in TELEMETRY:

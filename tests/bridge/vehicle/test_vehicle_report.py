@@ -69,7 +69,7 @@ def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
     assert bridge.report(world.now).mission is None
 
 
-def test_after_a_lost_link_only_what_matters_is_kept_with_the_age() -> None:
+def test_after_a_lost_link_arming_mode_and_place_are_kept_with_their_age() -> None:
     world = World()
     world.wait_ready()
     world.run(3.0)

@@ -38,7 +38,7 @@ def test_every_sentence_fits_a_hud(name: str, kind: Kind) -> None:
 
 @pytest.mark.parametrize("kind", Kind)
 @pytest.mark.parametrize("name", TABLE)
-def test_nothing_of_a_sentence_is_lost(name: str, kind: Kind) -> None:
+def test_sentences_are_shown_completely(name: str, kind: Kind) -> None:
     """What a HUD's line lacks is in another text."""
     said = " ".join(text for _, text in rendered(longest(name), kind))
     missing = [value for value in TABLE[name].longest if isinstance(value, str) and value not in said]

@@ -58,7 +58,7 @@ def test_bad_news_is_repeated_until_an_answer_shows_that_it_arrived(kind: Kind) 
         assert heard(kind, happening, answers=True) == 1
 
 
-def test_what_sys_status_replaces_on_the_hud_is_repeated() -> None:
+def test_texts_that_sys_status_replaces_are_repeated() -> None:
     assert heard(Kind.MISSION_PLANNER, MISSING, answers=True, is_replaced=True) == 3
     assert heard(Kind.QGROUNDCONTROL, MISSING, answers=True, is_replaced=True) == 1
 

@@ -67,7 +67,7 @@ def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: l
 
 
 @given(streams, st.sampled_from(FRAMES), streams)
-def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
+def test_a_frame_behind_garbage_is_lost_only_if_a_valid_frame_covers_it(
     before: bytes, frame: bytes, after: bytes
 ) -> None:
     data = before + frame + after

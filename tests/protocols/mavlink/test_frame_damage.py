@@ -70,7 +70,7 @@ def without_signature(frame: bytes) -> bytes:
 
 @pytest.mark.parametrize("damage", Damage)
 @pytest.mark.parametrize("sender", SENDERS)
-def test_all_intact_frames_and_no_damaged_ones_are_found(sender: str, damage: Damage) -> None:
+def test_exactly_the_intact_frames_are_found(sender: str, damage: Damage) -> None:
     """Fixed seeds, because each false header has a chance of 1 in 65536 to pass."""
     lost = false = 0
     for seed in range(4):
@@ -85,7 +85,7 @@ def test_all_intact_frames_and_no_damaged_ones_are_found(sender: str, damage: Da
 
 
 @given(st.data())
-def test_damage_loses_a_frame_only_to_a_false_one(data: st.DataObject) -> None:
+def test_damage_loses_a_frame_only_to_a_false_frame(data: st.DataObject) -> None:
     chance = data.draw(st.randoms(use_true_random=False))
     pieces: list[bytes] = []
     frames: list[bytes] = []
@@ -142,7 +142,7 @@ def test_a_truncated_frame_delays_only_as_many_bytes_as_it_lost(sender: str) -> 
         assert came_at <= max(ends, len(first) - kept + SIGNATURE_SIZE)
 
 
-def test_silence_releases_a_frame_hidden_by_a_truncated_one() -> None:
+def test_silence_releases_a_frame_hidden_by_a_truncated_frame() -> None:
     splitter = MavlinkSplitter()
     hiding = bytes((0xFD, 255, 0, 0, 1, 1, 1, 0, 0, 0))
     assert splitter.feed(hiding + FRAME + FRAME) == []

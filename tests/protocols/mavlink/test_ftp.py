@@ -69,7 +69,7 @@ def test_only_the_virtual_files_are_found(path: str) -> None:
 
 
 @pytest.mark.parametrize("opcode", [6, 7, 8, 9, 10, 11, 12, 13, 16, 99])
-def test_what_writes_or_is_unknown_is_refused(opcode: int) -> None:
+def test_writing_and_unknown_requests_are_refused(opcode: int) -> None:
     (reply,) = replies(FtpSession(FILES.get), request(opcode, b"small"))
     assert (reply.opcode, reply.data) == (129, bytes((2, 95)))
 

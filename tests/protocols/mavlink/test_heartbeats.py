@@ -34,7 +34,7 @@ def test_a_heartbeat_is_recognised(version: int) -> None:
 
 
 @pytest.mark.parametrize("msgid", [msgid for msgid in MESSAGE_FORMATS if msgid])
-def test_no_other_message_is_one(msgid: int) -> None:
+def test_other_messages_are_not_recognised(msgid: int) -> None:
     """The same bytes in another message, in MAVLink 2 perhaps without its zeros."""
     assert not is_plausible_heartbeat(frame(GOOD, msgid))
     if msgid < 256:

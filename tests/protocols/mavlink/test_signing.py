@@ -159,7 +159,7 @@ def sent_at(peer: SignedPeer) -> int:
     return int.from_bytes(peer.sign(bytes(10))[1:7], "little")
 
 
-def test_until_the_clock_is_set_a_peer_may_be_ahead_and_shuts_nobody_out() -> None:
+def test_until_the_clock_is_set_a_peer_may_be_ahead_without_harm_to_others() -> None:
     is_set = False
     timestamps = Timestamps(lambda: NOON, is_clock_set=lambda: is_set)
     signing = Signing(KEY, timestamps)
@@ -189,7 +189,7 @@ def test_a_time_over_a_day_ahead_of_every_clock_is_refused(timestamp: int) -> No
     assert signed_at(signing, ticks(NOON) + 2 * DAY, "another", 1) is Check.VALID
 
 
-def test_our_time_follows_two_hosts_that_agree_but_no_single_one() -> None:
+def test_our_time_follows_two_hosts_that_agree_but_not_a_single_host() -> None:
     signing = our_side()
     later = ticks(NOON) + 3600 * TICKS_PER_S
     for link_id in range(3):  # several programs of one laptop

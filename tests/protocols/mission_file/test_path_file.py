@@ -99,7 +99,7 @@ def test_a_zip_bomb_is_refused_before_it_is_unpacked(method: int) -> None:
         "lat,lon\n51.4771,0.0012\n51.4772,0.0015\n",
     ],
 )
-def test_a_path_without_heights_asks_for_one(text: str) -> None:
+def test_a_path_without_heights_needs_an_altitude(text: str) -> None:
     with pytest.raises(MissionFileError, match=r"no altitude; save it .*`naze-bridge convert field .* --alt METRES`"):
         read(text)
     assert read(text, alt_m=30) == flown(Frame.GLOBAL_RELATIVE_ALT, 30, 30)

@@ -87,7 +87,7 @@ def test_files_that_mission_planner_accepts_are_read_with_a_note(lines: list[str
     assert notes == ([note] if note else [])
 
 
-def test_a_file_without_home_gets_one_without_a_position() -> None:
+def test_a_file_without_home_gets_a_home_without_a_position() -> None:
     items, notes = noted(HEADER, POINT)
     assert notes == ["there is no item 0: home is missing"]
     assert (items[0].seq, items[0].command, items[0].lat_e7) == (0, 16, None)

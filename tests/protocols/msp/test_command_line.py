@@ -16,7 +16,7 @@ _BYTES = st.binary(max_size=30) | st.lists(st.sampled_from(HAZARDS), max_size=8)
 
 
 @given(frames=st.lists(_BYTES, max_size=6), lost=st.sets(st.integers(0, 200)))
-def test_clean_frames_form_no_run_whatever_is_lost(frames: list[bytes], lost: set[int]) -> None:
+def test_clean_frames_never_form_a_run_when_bytes_are_lost(frames: list[bytes], lost: set[int]) -> None:
     sent = b"".join(frame for frame in frames if is_clean(frame))
     received = bytes(byte for at, byte in enumerate(sent) if at not in lost)
     assert all(bytes((hazard,)) * 3 not in received for hazard in HAZARDS)
@@ -32,7 +32,7 @@ def test_every_printable_byte_is_rubbed_out() -> None:
     assert not line
 
 
-def test_two_requests_echoed_are_a_command_line_and_one_is_not() -> None:
+def test_two_echoed_requests_are_a_command_line_but_not_a_single_echo() -> None:
     watch = EchoWatch()
     watch.sent.extend((IDENT, IDENT, IDENT))
     typed = IDENT.replace(b"\0", b"")

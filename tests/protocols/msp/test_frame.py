@@ -51,7 +51,7 @@ def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: l
 
 
 @given(streams, frames, streams)
-def test_no_frame_is_lost_behind_garbage_unless_a_valid_one_covers_it(
+def test_a_frame_behind_garbage_is_lost_only_if_a_valid_frame_covers_it(
     before: bytes, frame: MspFrame, after: bytes
 ) -> None:
     found, parser = parse(before + frame.encode() + after, [])

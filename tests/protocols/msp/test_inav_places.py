@@ -34,7 +34,7 @@ def test_a_zone_is_read_as_it_was_set(zone: Geozone, polygon: bool) -> None:
     assert len(zone.vertex(0)) == 14 - 4 * polygon
 
 
-def test_replies_that_are_cut_are_none() -> None:
+def test_truncated_replies_are_rejected() -> None:
     safehome = Safehome(7, True, 453838000, -84733000)
     assert decode_safehome(safehome.pack()) == safehome
     assert decode_safehome(safehome.pack()[: 10 - 1]) is None

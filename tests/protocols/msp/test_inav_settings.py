@@ -36,7 +36,7 @@ def test_inavs_own_bytes_are_read() -> None:
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
-def test_a_cut_description_is_none_or_lacks_only_a_texts_end(setting: InavSetting) -> None:
+def test_a_truncated_description_is_rejected_or_lacks_only_the_end_of_a_text(setting: InavSetting) -> None:
     sent = setting.encode()
     for size in range(len(sent)):
         found = decode_setting_info(sent[:size])

@@ -52,7 +52,7 @@ def test_the_summary_has_state_reason_flags_and_record(record: int | None) -> No
     assert decode_summary(0x00_00_00_12) is None, "a state that is unknown"
 
 
-def test_no_record_is_none() -> None:
+def test_an_empty_record_is_rejected() -> None:
     progress = decode_flight(REPLY[:6] + b"\xff\xff\xff\xff" + REPLY[10:])
     assert progress is not None
     assert progress.record is progress.reached is None

@@ -50,7 +50,7 @@ def test_replies_survive_the_wire(status: ReplyStatus, first: int, settings: lis
 
 
 @given(st.binary(max_size=250))
-def test_bad_bytes_are_not_reply_or_a_whole_one(payload: bytes) -> None:
+def test_bad_bytes_are_rejected_or_a_whole_reply(payload: bytes) -> None:
     reply = decode_settings(payload)
     assert reply is None or len(encode_reply(reply)) == len(payload)
     decode_table(payload)

@@ -132,7 +132,7 @@ def test_of_waypoints_only_home_reads_everywhere() -> None:
     assert effects == [Effect.READ] + [Effect.UNKNOWN] * 255
 
 
-def test_what_firmware_disagrees_on_is_refused_on_unknown_boards() -> None:
+def test_ambiguous_commands_are_refused_on_unknown_boards() -> None:
     """INAV's RTC sets Betaflight's clock, SERVO_MIX_RULES is BIND on MultiWii, GPSSVINFO polls baseflight's GPS."""
     refused = {246, 241, 164, 209, 202}
     assert all(msp_right(Firmware.UNKNOWN, command, b"").effect is Effect.UNKNOWN for command in refused)

@@ -153,7 +153,7 @@ def test_values_that_no_board_gave_are_named(tmp_path: Path, files: dict[str, Pa
     }
 
 
-def test_with_home_given_a_list_without_it_keeps_its_first_item(tmp_path: Path) -> None:
+def test_with_home_given_a_list_without_it_keeps_the_first_item(tmp_path: Path) -> None:
     """Item 0 in a relative frame, or a TAKEOFF; the jump's target moves along."""
     place = ["--json", "--kind", "inav", "--home", "45.3838,8.4733"]
     away = [replace(POINT, seq=seq, p2=0.0, lat_e7=453839000 + 2000 * seq) for seq in range(3)]

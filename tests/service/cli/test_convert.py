@@ -46,7 +46,7 @@ def test_a_path_gets_the_altitude_and_home_that_are_given(tmp_path: Path) -> Non
         ("out.waypoints", ["--home", "91,0"], "is not a position"),
     ],
 )
-def test_refuses_what_it_cannot_do(tmp_path: Path, target: str, args: list[str], words: str) -> None:
+def test_refuses_unsupported_conversions(tmp_path: Path, target: str, args: list[str], words: str) -> None:
     done = run(tmp_path, "in.waypoints", WPL.format(16), str(tmp_path / target), *args)
     assert done.exit_code == 2
     assert words in " ".join(done.output.split())

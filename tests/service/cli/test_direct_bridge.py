@@ -85,7 +85,7 @@ def test_an_unknown_host_is_reported_in_one_sentence() -> None:
 
 
 @pytest.mark.parametrize("command", [["status"], ["missions", "list"], ["run", "--fc", "sim:"]])
-def test_a_user_without_a_home_is_told_of_the_state_dir_option(
+def test_a_user_without_a_home_is_pointed_to_the_state_dir_option(
     monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     def unknown_user(uid: int) -> None:

@@ -60,7 +60,7 @@ def test_a_daemon_does_not_load_libraries_of_commands() -> None:
     assert ended.stdout == "\n"
 
 
-def test_help_loads_neither_the_daemon_nor_large_libraries() -> None:
+def test_help_does_not_load_the_daemon_or_large_libraries() -> None:
     """Each takes a noticeable part of a second on a Pi."""
     script = (
         "import sys, click; from service.cli.main import main; context = click.Context(main); main.get_help(context);"

@@ -55,7 +55,7 @@ def test_settings_are_listed_changed_and_saved(tuned: Daemon) -> None:
     assert negative.returncode == 0, negative
 
 
-def test_what_cannot_be_set_is_reported_in_one_sentence(tuned: Daemon) -> None:
+def test_an_unsettable_name_is_reported_in_one_sentence(tuned: Daemon) -> None:
     assert_one_sentence(settings(tuned, "set", "p_roll", "999"), 1, "p_roll stays 35")
     assert_one_sentence(settings(tuned, "set", "p_roll", "high"), 1, "p_roll cannot be high: it must be 1..200")
     assert_one_sentence(settings(tuned, "set", "gbl_flg", "5"), 1, "gbl_flg stays")

@@ -55,7 +55,7 @@ def send(daemon: Daemon, line: bytes) -> dict[str, object]:
         return answer
 
 
-def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
+def test_bad_requests_are_answered_without_effect(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     daemon.push(plain_plan(5))
@@ -85,7 +85,7 @@ def test_a_client_that_disconnects_before_the_reply_does_no_harm(start: Starter)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_waiting_clients_are_told_of_a_stop(start: Starter, number: signal.Signals) -> None:
+def test_waiting_clients_are_informed_of_a_stop(start: Starter, number: signal.Signals) -> None:
     """One client is idle, another waits for a push to a hung flight controller."""
     bench = start.bench()
     daemon = bench.daemon

@@ -93,7 +93,7 @@ async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytes
     os.close(far)
 
 
-async def test_a_wrong_clock_is_told_until_a_network_sets_it(tmp_path: Path) -> None:
+async def test_a_wrong_clock_is_reported_until_a_network_sets_it(tmp_path: Path) -> None:
     daemon = Daemon(Settings(SimulatedFc()), Host(tmp_path))
     now, vehicle = daemon.started_at, daemon.bridge.vehicle
     assert daemon.clock_trouble == ""

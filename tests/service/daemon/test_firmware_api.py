@@ -51,6 +51,6 @@ async def test_a_battery_that_is_not_known_is_refused(age_s: float | None) -> No
         await api.flash(PATCHED, lambda _: None)
 
 
-def test_what_is_not_base64_is_not_understood(daemon: Daemon) -> None:
+def test_invalid_base64_is_refused(daemon: Daemon) -> None:
     with pytest.raises(ControlError, match="not base64"):
         ask_daemon(daemon.state_dir, {"do": "flash-firmware", "image": "?"})

@@ -52,7 +52,7 @@ def test_the_flight_is_continued_after_a_stop_and_a_later_crash(tmp_path: Path) 
     crashed.close(901.0)
 
 
-def test_without_a_flight_there_is_none(tmp_path: Path) -> None:
+def test_without_a_flight_there_is_no_file(tmp_path: Path) -> None:
     assert found(tmp_path) is None
     leave(tmp_path, FLIGHT)
     leave(tmp_path, None)

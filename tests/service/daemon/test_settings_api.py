@@ -24,7 +24,7 @@ BAD_REQUESTS = {
 }
 
 
-def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
+def test_bad_requests_are_answered_without_effect(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     until(lambda: daemon.ask({"do": "backups", "limit": 5})["backups"], "the first backup")
@@ -38,7 +38,7 @@ def test_bad_requests_are_answered_and_change_nothing(start: Starter) -> None:
     assert "Traceback" not in daemon.printed
 
 
-def test_a_backup_has_the_difference_from_the_one_before(start: Starter) -> None:
+def test_a_backup_has_the_difference_from_the_previous_backup(start: Starter) -> None:
     daemon = start.daemon("sim:")
     daemon.wait()
     until(lambda: daemon.ask({"do": "backups", "limit": 5})["backups"], "the first backup")

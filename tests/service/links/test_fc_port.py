@@ -201,7 +201,7 @@ async def test_the_next_read_follows_from_the_rate_of_the_last(size: int, since_
     await line.stop()
 
 
-async def test_after_a_request_nothing_is_gathered_for_a_while() -> None:
+async def test_after_a_request_reads_are_not_gathered_for_a_while() -> None:
     line = Gathering()
     port = await line.start()
     now = asyncio.get_running_loop().time()

@@ -181,7 +181,7 @@ async def test_over_udp_each_program_gets_its_own_replies() -> None:
     assert inside(daemon.bridge).sharing.refused.total() == 1
 
 
-async def test_a_further_client_displaces_the_silent_one(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_further_client_displaces_the_silent_client(monkeypatch: pytest.MonkeyPatch) -> None:
     """A laptop that was switched off never closes its connection."""
     monkeypatch.setattr("service.links.msp_share._MAX_PROGRAMS", 2)
     async with shared() as (daemon, first):

@@ -116,7 +116,7 @@ async def test_a_port_used_by_another_program_is_not_opened(pi: Pi, tmp_path: Pa
         assert jobs.status()["port"] is None
 
 
-async def test_a_board_that_need_not_answer_is_on_the_last_port_or_on_the_only_one(pi: Pi, tmp_path: Path) -> None:
+async def test_a_board_that_need_not_answer_is_on_the_last_or_only_port(pi: Pi, tmp_path: Path) -> None:
     finder = PortFinder(pi, None)
     with pytest.raises(PortError, match="none was found"):
         finder.port_of_silent_board()

@@ -120,7 +120,7 @@ async def test_frames_from_before_a_power_cut_are_replays_after_it(tmp_path: Pat
     state.close()
 
 
-async def test_a_laptop_whose_clock_is_ahead_locks_nobody_out_after_a_power_cut(tmp_path: Path) -> None:
+async def test_a_laptop_with_a_fast_clock_does_not_lock_others_out_after_a_power_cut(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     state = pi.boot()
     ahead = frame(ticks(NOON) + 80_000 * TICKS_PER_S, link_id=1)
@@ -149,7 +149,7 @@ async def test_a_reset_believes_the_next_ground_station_also_after_a_restart(tmp
     state.close()
 
 
-async def test_it_is_written_every_10_s_but_not_while_nothing_is_signed(
+async def test_it_is_written_every_10_s_while_packets_are_signed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.links.signing_state._LOOK_S", 0.001)

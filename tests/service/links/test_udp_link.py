@@ -39,7 +39,7 @@ async def test_a_network_that_is_down_loses_only_the_datagram(links: Links) -> N
     assert await received(client) == FRAME
 
 
-async def test_datagrams_to_a_closed_port_block_nothing(links: Links) -> None:
+async def test_datagrams_to_a_closed_port_do_not_block(links: Links) -> None:
     link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
     deaf, client = links.udp(), links.udp()
     for _ in range(5000):

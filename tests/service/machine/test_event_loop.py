@@ -114,7 +114,7 @@ async def test_a_hold_can_end_early(port: Port) -> None:
 
 
 @pytest.mark.parametrize("how", ["call_soon", "call_later", "call_soon_threadsafe"])
-def test_the_loop_does_at_once_what_a_call_asks_of_it(loop: EventLoop, how: str) -> None:
+def test_the_loop_runs_new_callbacks_at_once(loop: EventLoop, how: str) -> None:
     """Otherwise it would wait for its next timer, an hour away."""
 
     def ask(now: float) -> None:
@@ -244,7 +244,7 @@ def test_a_hold_ends_at_the_time_and_the_timer_is_not_early(waiting: Waiting) ->
 
 
 @pytest.mark.parametrize("waiting", [(1.0, 2.0)], indirect=True)
-def test_the_loop_does_not_get_a_turn_for_what_it_was_asked_before(waiting: Waiting) -> None:
+def test_earlier_callbacks_do_not_cost_a_turn(waiting: Waiting) -> None:
     waiting.selector.has_work = True
     assert waiting.selector.select(5.0) == []
     assert waiting.now == 5.0

@@ -32,7 +32,7 @@ def test_a_chain_and_a_ring_of_links(tmp_path: Path) -> None:
     assert not machine.is_tty(machine.resolve("/dev/ring"))
 
 
-def test_a_missing_file_and_a_binary_one_are_texts(tmp_path: Path) -> None:
+def test_missing_and_binary_files_are_read_as_text(tmp_path: Path) -> None:
     machine = Host(tmp_path)
     assert machine.read("/etc/os-release") == ""
     (tmp_path / "x").write_bytes(b"a\xffb")

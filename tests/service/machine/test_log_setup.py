@@ -67,7 +67,7 @@ def test_a_terminal_does_not_get_escape_sequences_of_others() -> None:
     assert b"a[2Jb" in shown
 
 
-def test_a_line_longer_than_the_pipe_neither_blocks_nor_damages_others() -> None:
+def test_a_line_longer_than_the_pipe_does_not_block_or_damage_others() -> None:
     script = """
 log.info("fc.lost", why="x" * 1_000_000)
 log.info("never.read")

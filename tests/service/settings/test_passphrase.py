@@ -24,7 +24,7 @@ from service.settings.passphrase import LEAST_BITS, most_bits, new_passphrase, w
         "Grüße",
     ],
 )
-def test_short_repeated_and_sequential_ones_are_weak(passphrase: str) -> None:
+def test_short_repeated_and_sequential_keys_are_weak(passphrase: str) -> None:
     why = weakness(passphrase)
     assert why is not None
     assert passphrase not in why
@@ -34,7 +34,7 @@ def test_short_repeated_and_sequential_ones_are_weak(passphrase: str) -> None:
     "passphrase",
     ["k7mq2-x9tvb-3hndc-pw4ea", "xkqzvhwtmpfrbgjydsn", "7Gh!pQ2z#Lw9Rt", "8305719264024681359703847"],
 )
-def test_long_random_ones_are_not(passphrase: str) -> None:
+def test_long_random_keys_are_strong(passphrase: str) -> None:
     assert weakness(passphrase) is None
 
 
@@ -45,7 +45,7 @@ def test_a_character_more_is_never_easier_to_guess() -> None:
     assert bits[0] == 0
 
 
-def test_a_new_one_is_random_strong_and_easy_to_type() -> None:
+def test_a_new_key_is_random_strong_and_easy_to_type() -> None:
     made = {new_passphrase() for _ in range(200)}
     assert len(made) == 200
     letters = set("".join(made)) - {"-"}

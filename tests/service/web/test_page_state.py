@@ -89,7 +89,7 @@ def test_an_open_page_is_loaded_again_after_an_upgrade(page: Browser) -> None:
 @pytest.mark.parametrize(
     ("received", "words"), [("count += 400", "bytes arrive, but no frames"), ("count", "silence. Check power")]
 )
-def test_while_searching_the_page_shows_what_arrives_on_the_wire(page: Browser, received: str, words: str) -> None:
+def test_while_searching_the_page_shows_the_bytes_on_the_wire(page: Browser, received: str, words: str) -> None:
     page.run(
         """
         const fetched = window.fetch;

@@ -99,7 +99,7 @@ def test_a_form_of_another_site_is_refused(web: WebBench) -> None:
 @pytest.mark.parametrize(
     "body", [b"", b"7", b"[]", b"{}", b"\xff", b"{" * 5000, b'{"action": "shell"}', b'{"action": ["fix"]}']
 )
-def test_what_is_not_a_request_is_refused(web: WebBench, body: bytes) -> None:
+def test_invalid_requests_are_refused(web: WebBench, body: bytes) -> None:
     assert post(web, "/api/pi", body).status == 422
 
 

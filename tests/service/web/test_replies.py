@@ -10,7 +10,7 @@ from service.web.replies import Turns, begun, whole
 
 
 @pytest.mark.parametrize("text", ["", "-1", "1.5", "x", "9" * 30, "2147483648", "²"])
-def test_what_is_not_a_number_is_not_found(text: str) -> None:
+def test_an_invalid_number_is_not_found(text: str) -> None:
     with pytest.raises(HTTPException) as caught:
         whole(text)
     assert caught.value.status_code == 404

@@ -47,7 +47,7 @@ def test_a_check_does_not_change_anything(web: WebBench) -> None:
     assert (web.board.records(), web.daemon.missions()) == (held, missions)
 
 
-def test_a_check_says_what_the_file_holds_beside_the_mission(web: WebBench) -> None:
+def test_a_check_names_the_other_contents_of_the_file(web: WebBench) -> None:
     fence = b'"geoFence": {"circles": [{}]}'
     plan = (EXAMPLE.with_suffix(".plan").read_bytes().rstrip()[:-1]) + b"," + fence + b"}"
     answer = post(web, "/api/check?name=field.plan", plan)

@@ -34,7 +34,7 @@ def tuned(web: WebBench) -> WebBench:
     return web
 
 
-def test_a_backup_shows_the_changes_and_what_restoring_it_would_change(tuned: WebBench) -> None:
+def test_a_backup_shows_its_changes_and_the_effect_of_a_restore(tuned: WebBench) -> None:
     newest, first = (tuned.ask(f"/api/settings/{number}").data for number in (2, 1))
     assert newest["changes"] == [{"name": "p_roll", "left": 35, "right": 44}]
     assert (newest["before"], newest["plan"]["changes"]) == (1, [])

@@ -52,7 +52,7 @@ def test_a_failed_declaration_closes_the_session_and_is_repeated(monkeypatch: py
     assert [event["event"] for event in events] == ["zenoh.not_open", "zenoh.open"]
 
 
-def test_waiting_replies_to_guests_displace_neither_a_commands_reply_nor_a_report() -> None:
+def test_waiting_replies_to_guests_do_not_displace_replies_to_commands_or_reports() -> None:
     thread = SessionThread(make_config(ZenohSettings(listen=(f"tcp/127.0.0.1:{free_port()}",))), lambda _session: None)
     ran: list[str] = []
     done = threading.Event()

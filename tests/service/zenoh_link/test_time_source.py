@@ -57,7 +57,7 @@ def test_without_a_recent_fix_there_is_no_gps_time(tmp_path: Path, fix: Fix, age
 
 
 @pytest.mark.parametrize(("unix_s", "known"), [(1_777_636_800.25, 1_777_636_800.25), (0.0, None), (412.0, None)])
-def test_a_mavlink_autopilots_time_is_used_once_it_has_one(unix_s: float, known: float | None) -> None:
+def test_a_mavlink_autopilots_time_is_used_once_it_is_known(unix_s: float, known: float | None) -> None:
     """Until it has the time, ArduPilot counts from its start."""
     vehicle, codec = Vehicle(), m.MAVLink(None, srcSystem=1, srcComponent=1)
     telemetry = MavlinkTelemetry(MavlinkReadings(vehicle))

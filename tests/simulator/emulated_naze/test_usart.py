@@ -29,7 +29,7 @@ def receive_ring(size: int) -> Steps:
     return steps.store(ccr, 1 << 7 | 1 << 5 | 1)
 
 
-def test_bytes_are_sent_one_by_one() -> None:
+def test_bytes_are_sent_singly() -> None:
     steps = open_port()
     for byte in b"hello":
         steps.wait(SR, TXE).store(DR, byte)
@@ -40,7 +40,7 @@ def test_bytes_are_sent_one_by_one() -> None:
     assert rig.log(1) == [TC | TXE]
 
 
-def test_bytes_are_received_one_by_one() -> None:
+def test_bytes_are_received_singly() -> None:
     steps = open_port()
     for _ in range(3):
         steps.wait(SR, RXNE).load(DR)

@@ -60,7 +60,7 @@ def test_a_flight_to_the_end_of_the_list() -> None:
     assert found.extremes.steepest_deg == pytest.approx(5.7, abs=0.1)
 
 
-def test_a_flight_that_was_stopped_tells_the_reason() -> None:
+def test_a_stopped_flight_reports_the_reason() -> None:
     found = logged_sortie(tlog(flight(1.0, HELD)), RECORDS)
     assert not found.is_flown
     assert found.items[0].problems == ["not reached", "the flight was stopped: stalled"]

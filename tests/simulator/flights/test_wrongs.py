@@ -24,6 +24,6 @@ def test_a_jump_and_an_outage_come_after_20_s_and_the_rest_at_once() -> None:
 
 
 @pytest.mark.parametrize("told", ["wind=3", "compass", "compass=nan", "compass=east"])
-def test_a_lie_that_cannot_be_told_is_reported_in_one_sentence(told: str) -> None:
+def test_an_invalid_lie_is_reported_in_one_sentence(told: str) -> None:
     with pytest.raises(ValueError, match=f"--lie {told}"):
         Wrongs([told])

@@ -153,7 +153,7 @@ def test_save_of_an_incomplete_list_is_an_error() -> None:
     assert answer(bench, SAVE) == "!"
 
 
-def test_load_with_nothing_saved_is_an_error_only_if_ram_is_empty() -> None:
+def test_load_without_a_saved_mission_is_an_error_only_if_ram_is_empty() -> None:
     bench = MspBench("inav")
     assert answer(bench, LOAD) == "!"
     bench.upload(THREE)

@@ -106,7 +106,7 @@ def test_a_request_with_a_bad_checksum_is_ignored() -> None:
     assert Bench().ask(IDENT[:-1] + b"\x00", timeout=0.3) is None
 
 
-def test_after_a_truncated_frame_the_stock_receiver_swallows_the_next_ones() -> None:
+def test_after_a_truncated_frame_the_stock_receiver_swallows_the_next_frames() -> None:
     bench = Bench(faults=Faults(extension=False))
     bench.send(request(200, bytes(16))[:9])
     bench.run(1.0)

@@ -419,7 +419,7 @@ def test_the_same_radius_is_not_written_again() -> None:
 
 
 @pytest.mark.parametrize(("old", "operations"), [(0, 20 + 2), (9, 3 + 20 + 2)])
-def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(old: int, operations: int) -> None:
+def test_a_power_cut_at_any_flash_operation_leaves_the_old_or_the_new_list(old: int, operations: int) -> None:
     """Cut the power during each erase, each record and the header; boot, check, and push again."""
     new = mission(20, 1)
     outcomes = []
@@ -450,7 +450,7 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list_or_the_new_one(o
 
 
 @pytest.mark.parametrize("operation", range(1, 5))
-def test_a_power_cut_in_the_configuration_leaves_the_old_or_the_new_one(operation: int) -> None:
+def test_a_power_cut_leaves_the_old_or_the_new_configuration(operation: int) -> None:
     """Its staged page is erased and programmed, then its place."""
     bench = Bench()
     bench.push(mission(7))

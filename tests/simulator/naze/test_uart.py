@@ -32,7 +32,7 @@ def test_bytes_arrive_one_after_the_other_at_line_rate() -> None:
     assert drain(uart, 1.0 + 3.0 * BYTE) == b"bc"
 
 
-def test_later_bytes_follow_earlier_ones_on_the_wire() -> None:
+def test_later_bytes_follow_earlier_bytes_on_the_wire() -> None:
     uart, _ = make(9600)
     uart.receive(b"x" * 10, 0.0)
     uart.receive(b"y", 0.001)

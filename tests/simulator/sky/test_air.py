@@ -20,7 +20,7 @@ def test_wind_blows_from_where_it_is_said_to_come(speed: float, seed: int) -> No
     assert (north, west, up) == pytest.approx((0.0, -speed, 0.0), abs=1e-9)
 
 
-def test_gusts_average_to_nothing() -> None:
+def test_gusts_average_to_zero() -> None:
     wind = Wind(5.0, 0.0, seed=3)
     found = [wind.at(0.05 * step) for step in range(40_000)]
     north = [v[0] for v in found]

@@ -331,7 +331,7 @@ def test_a_take_off_after_a_dropped_item_rejects_the_list() -> None:
     assert_rejected(verdict, MissionResult.INVALID, 2, "command")
 
 
-def test_a_take_off_after_items_that_are_not_stored_names_what_to_remove() -> None:
+def test_a_take_off_after_dropped_items_names_the_items_to_remove() -> None:
     verdict = verdict_on(item(SPEED), item(TAKEOFF), item(WAYPOINT))
     why = "TAKEOFF must be item 1: remove WP 1 DO_CHANGE_SPEED, which is not stored"
     assert verdict.findings[-1].text() == f"Rejected, WP 2: {why}"
@@ -356,7 +356,7 @@ def test_a_roi_cannot_be_the_last_kept_item(dropped: MissionItem) -> None:
 
 
 @pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
-def test_some_commands_cannot_be_the_only_one(command: int) -> None:
+def test_some_commands_cannot_be_alone(command: int) -> None:
     assert_rejected(verdict_on(item(command)), MissionResult.INVALID, 1, "command")
 
 
@@ -371,11 +371,11 @@ def test_a_list_of_rois_is_not_a_mission() -> None:
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME])
-def test_other_commands_can_be_the_only_one(command: int) -> None:
+def test_other_commands_can_be_alone(command: int) -> None:
     assert verdict_on(item(command)).result is Result.ACCEPTED
 
 
-def test_two_commands_that_cannot_be_the_only_one_are_accepted_together() -> None:
+def test_two_commands_that_cannot_be_alone_are_accepted_together() -> None:
     assert verdict_on(item(TAKEOFF), item(LAND)).result is Result.ACCEPTED
 
 

@@ -70,7 +70,7 @@ def flight_core(tmp_path_factory: pytest.TempPathFactory) -> FlightCore:
 
 
 @pytest.mark.parametrize(("items", "here", "told"), CASES)
-def test_the_core_refuses_exactly_what_is_told(
+def test_the_core_refuses_exactly_the_reported_lists(
     flight_core: FlightCore, items: tuple[MissionItem, ...], here: tuple[int, int] | None, told: list[str]
 ) -> None:
     assert warnings(*items, here=here) == told
@@ -89,7 +89,7 @@ MIDDLE = st.sampled_from([WAYPOINT, WAYPOINT, WAYPOINT, TIME, TURNS, RTL, ROI])
     st.sampled_from([None, LAND, RTL]),
     st.sampled_from([0, 150, 1000]),
 )
-def test_every_refusal_of_the_core_is_told_and_no_other(
+def test_exactly_the_refusals_of_the_core_are_reported(
     flight_core: FlightCore,
     takes_off: bool,
     legs: list[tuple[int, tuple[float, float, int]]],
@@ -136,7 +136,7 @@ def test_a_board_that_does_not_fly_missions_has_plain_limits() -> None:
         (20.0, []),
     ],
 )
-def test_a_return_below_the_way_out_is_told(rtl_m: float, told: list[str]) -> None:
+def test_a_return_below_the_way_out_is_reported(rtl_m: float, told: list[str]) -> None:
     assert warnings(north(1, alt_m=20.0), item(RTL, alt_m=rtl_m)) == told
 
 

@@ -206,7 +206,7 @@ def test_a_push_fails_after_a_long_stall() -> None:
     assert reported["ACCEPTED"] < 8
 
 
-def test_a_power_cut_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
+def test_a_power_cut_at_any_moment_leaves_the_old_or_the_new_list() -> None:
     def inject(world: World, draw: random.Random) -> None:
         begin = draw.random() * 0.4
         world.after(begin, world.power_off)
@@ -215,7 +215,7 @@ def test_a_power_cut_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
     assert len(outcomes(inject, 24)) > 1
 
 
-def test_a_port_lost_at_any_moment_leaves_the_old_list_or_the_new_one() -> None:
+def test_a_port_lost_at_any_moment_leaves_the_old_or_the_new_list() -> None:
     """The push ends with the line, and never continues on the next one."""
 
     def inject(world: World, draw: random.Random) -> None:

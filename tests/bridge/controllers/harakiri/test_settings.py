@@ -9,7 +9,7 @@ from tests.support.settings_client import BOARDS, SettingsClient, asked, cause_o
 from tests.support.world import World
 
 
-def test_the_list_takes_less_than_two_seconds_and_later_ones_come_from_memory() -> None:
+def test_the_list_takes_less_than_two_seconds_and_is_then_cached() -> None:
     world = World(speeds=(115200,))
     world.wait_until(lambda world: world.is_found, 20)
     began = world.now
@@ -34,7 +34,7 @@ def test_a_change_that_touches_others_is_read_back_whole() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_bad_line_gives_the_true_table_or_none(seed: int) -> None:
+def test_a_bad_line_gives_the_true_table_or_no_table(seed: int) -> None:
     world = World(faults=Faults(bit_error_rate=1e-4), speeds=(115200,), seed=seed)
     table = SettingsClient(world).wait_read(120)
     held = [

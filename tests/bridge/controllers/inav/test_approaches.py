@@ -116,7 +116,7 @@ def test_an_approach_of_a_place_that_is_not_a_rally_point_is_cleared() -> None:
     assert approaches_of(board)[:6] == [FwApproach(number) for number in range(6)]
 
 
-def test_a_rally_point_that_is_refused_leaves_the_old_ones_with_their_approaches(
+def test_a_refused_rally_point_leaves_the_old_points_with_their_approaches(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     board, _, station = board_with(version="9.1.0")

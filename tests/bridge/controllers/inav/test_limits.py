@@ -55,7 +55,7 @@ def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
     assert texts(NEAR, speed(12), FAR, nav_max_auto_speed=1200) == []
 
 
-def test_what_an_aeroplane_ignores_is_named() -> None:
+def test_values_that_an_aeroplane_ignores_are_named() -> None:
     yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
     assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, platform=Platform.AEROPLANE)[:2] == [
         "WP 3: its speed: no effect on an aeroplane (+2)",
@@ -64,7 +64,7 @@ def test_what_an_aeroplane_ignores_is_named() -> None:
 
 
 @pytest.mark.parametrize("platform", [Platform.ROVER, Platform.BOAT])
-def test_what_a_rover_or_boat_flies_otherwise_is_named(platform: Platform) -> None:
+def test_differences_on_a_rover_or_boat_are_named(platform: Platform) -> None:
     hold, land = item(Command.NAV_LOITER_TIME, p1=5.0), replace(FAR, command=Command.NAV_LAND)
     assert sorted(texts(speed(3), NEAR, hold, land, platform=platform)) == [
         f"WP 2: Alt: no effect on {platform.value} (+2)",
@@ -124,7 +124,7 @@ def test_waypoints_within_the_radius_are_named() -> None:
         (RTL_LANDS, {"safehomes": (Safehome(3, True, LAT + 3 * NORTH, LON),)}, []),
     ],
 )
-def test_a_return_home_that_differs_from_what_is_shown_is_named(
+def test_a_return_home_that_differs_from_the_list_is_named(
     rtl: MissionItem, limits: dict[str, Any], news: list[str]
 ) -> None:
     assert texts(WP, rtl, **limits) == [f"WP 2: {each}" for each in news]

@@ -258,7 +258,7 @@ def test_an_unfinished_frame_in_the_parser_does_not_hide_the_board(size: int) ->
 
 
 @pytest.mark.parametrize("write_ms", [1100.0, 2200.0])
-def test_a_slow_flash_write_neither_fails_nor_loses_the_link(write_ms: float) -> None:
+def test_a_slow_flash_write_does_not_fail_or_lose_the_link(write_ms: float) -> None:
     """An STM32H743 erases the sector of its settings in 1.1 s, at most 2.2 s."""
     board, world, station = board_with(eeprom_write_ms=write_ms, serial_task_ms=10.0)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))

@@ -131,7 +131,7 @@ def test_a_board_without_geozones_refuses_a_fence(kind: str, version: str) -> No
     ("version", "text"),
     [("7.1.2", "This flight controller has no fence"), ("9.1.0", "Switch geozones in INAV's own settings")],
 )
-def test_a_fence_button_is_refused_by_what_the_board_has(version: str, text: str) -> None:
+def test_a_fence_button_is_refused_according_to_the_board(version: str, text: str) -> None:
     _, world, station = board_with("inav", version=version)
     station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_DO_FENCE_ENABLE, 0, 1, *[0] * 6))
     world.run(1)

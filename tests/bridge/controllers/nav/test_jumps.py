@@ -78,7 +78,7 @@ def test_a_jump_to_the_first_record_as_the_last_means_hover() -> None:
     assert verdict_on(WP, jump(5), WP, RTL_LANDS, WP, WP, WP, jump(5)).result is Result.ACCEPTED
 
 
-def test_nested_jumps_are_rejected_on_multiwii_but_successive_ones_are_not() -> None:
+def test_only_nested_jumps_are_rejected_on_multiwii() -> None:
     assert verdict_on(WP, WP, jump(1), WP, jump(1), rules=MULTIWII).ack is MissionResult.INVALID_PARAM1
     assert len(kept(WP, WP, jump(1), WP, WP, jump(4), rules=MULTIWII)) == 6
     assert len(kept(WP, WP, WP, jump(1), WP, WP, jump(1))) == 7

@@ -272,7 +272,7 @@ def test_the_current_item_and_reached_items_are_reported() -> None:
     assert all(m.total == 5 for m in received if m.get_type() == "MISSION_CURRENT" and m.seq)
 
 
-def test_a_frame_that_may_have_lost_the_header_is_followed_by_a_harmless_one() -> None:
+def test_a_frame_that_may_have_lost_the_header_is_followed_by_a_harmless_request() -> None:
     """INAV opens its CLI on a '#' outside a frame followed by 100 ms of silence, and then no longer answers MSP."""
     for lost in range(1, 12):
         inav = FakeInav()

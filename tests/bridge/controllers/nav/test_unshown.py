@@ -99,7 +99,7 @@ def test_the_other_legs_keep_them_when_a_leg_is_inserted_or_deleted() -> None:
     assert lost == ["Lost with the old list, as no MAVLink item can show it: user actions (1)"]
 
 
-def test_a_changed_leg_between_unchanged_ones_loses_only_its_own() -> None:
+def test_a_changed_leg_loses_only_its_own_values() -> None:
     def raised(items: list[MissionItem]) -> list[MissionItem]:
         return [*items[:2], replace(items[2], alt_m=30.0), *items[3:]]
 

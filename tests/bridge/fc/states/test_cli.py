@@ -159,7 +159,7 @@ def test_does_not_send_anything_while_a_person_types() -> None:
     assert is_in_cli(world)
 
 
-def test_a_list_that_looks_like_an_echo_is_not_mistaken_for_one() -> None:
+def test_a_list_that_looks_like_an_echo_is_still_a_list() -> None:
     """The coordinate 67.5040548 N contains a request's header, and the board sends it twice."""
     world = World()
     world.wait_ready()

@@ -213,7 +213,7 @@ def test_signing_keys_are_never_forwarded() -> None:
     assert one.messages("SETUP_SIGNING") == other.messages("SETUP_SIGNING") == []
 
 
-def test_damaged_frames_are_dropped_and_intact_ones_kept() -> None:
+def test_damaged_frames_are_dropped_and_intact_frames_kept() -> None:
     world, autopilot, (station, _) = passing()
     chance = random.Random(3)
     intact = []

@@ -23,7 +23,7 @@ from service.cli.helper.actions import ACTIONS
         b'{"action": "overview", "\\udfff": 1}',
     ],
 )
-def test_what_is_not_an_action_is_refused(line: bytes) -> None:
+def test_an_unknown_action_is_refused(line: bytes) -> None:
     with pytest.raises(HelperRefusal, match="This is not an action; known are overview, doctor, fix"):
         parse_action(line, ACTIONS)
 

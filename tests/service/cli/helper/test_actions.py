@@ -47,7 +47,7 @@ def test_the_bridge_restarts_only_after_the_reply(pi: FixablePi) -> None:
         ({"hotspot": "kite"}, "a name and a password"),
     ],
 )
-def test_answers_that_cannot_be_used_change_nothing(pi: FixablePi, wrong: dict[str, str], why: str) -> None:
+def test_invalid_answers_have_no_effect(pi: FixablePi, wrong: dict[str, str], why: str) -> None:
     with pytest.raises(HelperRefusal, match=why):
         pi.ask("answer", **wrong)
     assert not pi.path(SETTINGS_FILE).exists()

@@ -84,7 +84,7 @@ def test_settings_that_cannot_be_used_leave_the_file(pi: FixablePi, monkeypatch:
     assert pi.ran == []
 
 
-def test_what_was_written_by_hand_wins(pi: FixablePi) -> None:
+def test_handwritten_settings_win(pi: FixablePi) -> None:
     pi.write(str(SERVICE_CONFIG), "\nsysid = 3\n")
     assert shown(pi, "sysid")["elsewhere"] == "/etc/naze-bridge/config.toml:2"
     with pytest.raises(

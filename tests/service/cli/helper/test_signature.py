@@ -18,7 +18,7 @@ def key(tmp_path: Path) -> ReleaseKey:
     return ReleaseKey(tmp_path / "key")
 
 
-def test_a_signed_package_is_one_for_dpkg_and_the_signature_comes_off(tmp_path: Path, key: ReleaseKey) -> None:
+def test_dpkg_accepts_a_signed_package_and_the_signature_can_be_removed(tmp_path: Path, key: ReleaseKey) -> None:
     package = packed(tmp_path)
     before = package.read_bytes()
     key.sign(package)

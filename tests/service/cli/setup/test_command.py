@@ -135,13 +135,13 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
         "",
     ],
 )
-def test_a_password_that_is_none_is_refused(password: str) -> None:
+def test_an_invalid_password_is_refused(password: str) -> None:
     with pytest.raises(click.UsageError, match="8 to 63 characters"):
         check_answers("kite", password, "DE", None)
 
 
 @pytest.mark.parametrize("name", ["", "n" * 33, "ü" * 17, "a\nb", "a\0b", "a\x1bb", "\ud800", "a\u202eb"])
-def test_a_network_name_that_is_none_is_refused(name: str) -> None:
+def test_an_invalid_network_name_is_refused(name: str) -> None:
     with pytest.raises(click.UsageError, match="not a network name"):
         check_answers(name, "long-enough", "DE", None)
 
@@ -207,7 +207,7 @@ def test_a_reboot_is_requested_once_the_console_left_the_uart(pi: Pi) -> None:
     assert "sudo reboot" not in pi.setup("--yes").output
 
 
-def test_the_pages_token_is_shown_only_if_it_is_one(tmp_path: Path) -> None:
+def test_the_pages_token_is_shown_only_if_it_is_valid(tmp_path: Path) -> None:
     """The service, which writes the file, may have been taken over; setup prints it on root's terminal."""
     pi = FreshPi(tmp_path, "4")
     token = pi.write("/var/lib/naze-bridge/web-token", "2345-6789-abcd\n")

@@ -148,7 +148,7 @@ def test_a_kept_hotspot_is_opened_at_once_and_waits_for_no_device(pi: FaultyMach
     assert list(hotspot_steps(pi, _NETWORKS[0], is_kept=True)) == []
 
 
-def test_without_a_previous_network_it_waits_for_nobody(pi: FaultyMachine) -> None:
+def test_without_a_previous_network_it_does_not_wait(pi: FaultyMachine) -> None:
     manager = NetworkManager(pi, previous=None)
     assert open_hotspot(pi, manager, lambda _: pytest.fail("it waited")) == "the hotspot is open"
     assert opens_at_boot(pi)
