@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from protocols.msp.mode_ranges import range_writes, ranges_text
 
 ARM, ANGLE, UNUSED = b"\0\0\x20\x30", b"\1\1\x10\x20", bytes(4)
+HELD = st.tuples(st.integers(0, 255), st.integers(0, 255), st.integers(0, 48), st.integers(0, 48)).map(bytes)
 RANGES = st.lists(st.tuples(st.integers(0, 13), st.integers(0, 47), st.integers(1, 48)), max_size=4)
 
 
@@ -25,7 +26,7 @@ def test_a_mode_is_shown_with_channel_and_pulses() -> None:
 
 
 @given(
-    held=st.lists(st.binary(min_size=4, max_size=4).filter(lambda each: max(each[2:]) <= 48), min_size=8, max_size=8),
+    held=st.lists(HELD, min_size=8, max_size=8),
     wanted=RANGES,
     number=st.integers(1, 3),
 )
