@@ -94,6 +94,7 @@ real-board: $(VENV)/.test-ready
 soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \
 	    tests/storage/test_store_durability.py tests/storage/test_salvage.py
+	UPLOADS=200 $(BIN)/python -m pytest --timeout 0 tests/scenarios/test_qgc_uploads.py
 	FLEET_DAEMONS=50 FLEET_CUTS=5 $(BIN)/python -m pytest tests/fleet/test_fleet_soak.py
 	$(MAKE) -C firmware test
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGroundControl's transfers over lossy links, each compared with the same transfer with an ideal vehicle."""
 
+import os
 import random
 from collections.abc import Sequence
 
@@ -11,6 +12,8 @@ from tests.support.conversations import records_of, waypoints
 from tests.support.qgc_upload import Begin, FatedLink, QgcDownload, QgcStation, QgcUpload, with_ideal_vehicle
 from tests.support.world import World, flash_holding
 
+#: Of each kind; `make soak` has 200.
+UPLOADS = int(os.environ.get("UPLOADS", "60"))
 OLD_RECORDS = records_of(waypoints(15, seed=777))
 OLD_FLASH = flash_holding(OLD_RECORDS)
 A = MissionResult
@@ -29,7 +32,7 @@ def uploads(items: Sequence[MissionItem]) -> Begin:
     return lambda clock, send: QgcUpload(clock, send, items)
 
 
-@pytest.mark.parametrize("first_seed", range(0, 200, 20))
+@pytest.mark.parametrize("first_seed", range(0, UPLOADS, 20))
 @pytest.mark.parametrize("loss", [0.05, 0.1, 0.15])
 def test_no_upload_fails_that_an_ideal_vehicle_would_save(loss: float, first_seed: int) -> None:
     failed = []
@@ -47,7 +50,7 @@ def test_no_upload_fails_that_an_ideal_vehicle_would_save(loss: float, first_see
 
 
 @pytest.mark.parametrize("kind", ["download", "upload"])
-@pytest.mark.parametrize("first_seed", range(0, 100, 20))
+@pytest.mark.parametrize("first_seed", range(0, UPLOADS, 40))
 def test_the_final_ack_never_meets_the_next_transfer(first_seed: int, kind: str) -> None:
     """Which begins 0.1 to 0.5 s after the end of an upload. To QGroundControl a late ack is the next transfer's end."""
     failed: list[int] = []
