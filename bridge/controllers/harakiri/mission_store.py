@@ -196,22 +196,41 @@ class HarakiriMissions(_HarakiriStore):
     def _transfer(
         self, packed: bytes, wanted: ListIdentity, begun: Staged, progress: PushProgress
     ) -> Conversation[None]:
-        """Chunk by chunk, each from the first record that the flight controller lacks, then COMMIT."""
-        done = _confirmed(packed, begun)
+        """Chunks, as many on their way as the board can queue, then COMMIT.
+
+        After a loss the answers to the later chunks are awaited, before it goes on with the first missing record.
+        """
+        done = sent = _confirmed(packed, begun)
         most = self.info.chunk_records
         wasted = 0
+        unanswered: list[int] = []  # the first record of each chunk
+        is_lost = False
         while done < wanted.count:
-            chunk = send(ext.encode_chunk(packed, done, most).frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
-            reply: MspFrame | None = yield Receive(frozenset((MissionCommand.CHUNK,)), chunk)
+            while not is_lost and sent < wanted.count and len(unanswered) < self.info.chunk_window:
+                chunk = ext.encode_chunk(packed, sent, most)
+                yield send(chunk.frame, MissionCommand.CHUNK, _SHORT_REPLY_SIZE)
+                unanswered.append(sent)
+                sent += chunk.count
+            reply: MspFrame | None = yield Receive(frozenset((MissionCommand.CHUNK,)))
             answer = None if reply is None else ext.decode_progress(reply.payload)
-            if answer is not None and answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
+            if answer is None:
+                unanswered = []
+            elif answer.status not in (ReplyStatus.OK, ReplyStatus.SEQUENCE):
                 raise _again(answer.status)
-            if answer is not None and (confirmed := _confirmed(packed, answer)) > done:
-                done, wasted = confirmed, 0
-                progress(done)
+            else:
+                is_lost = is_lost or answer.status is ReplyStatus.SEQUENCE
+                if (confirmed := _confirmed(packed, answer)) > done:
+                    done, wasted = confirmed, 0
+                    progress(done)
+                while unanswered and unanswered[0] < done + is_lost:
+                    del unanswered[0]
+                if is_lost:
+                    # The board refuses a chunk behind a missing one.
+                    del unanswered[:1]
+            if unanswered or not (is_lost or answer is None):
                 continue
-            # A frame was lost. A bad line loses long frames most.
-            most = max(most // 2, 1)
+            # A bad line loses long frames most.
+            sent, is_lost, most = done, False, max(most // 2, 1)
             wasted += 1
             if wasted > _MAX_WASTED:
                 raise PushFailed(PushFailure.NO_ANSWER)
