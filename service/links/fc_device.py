@@ -50,12 +50,7 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
     """A function that opens the device, and reopens it after a loss. For AutoFc see PortFinder."""
     assert not isinstance(address, AutoFc)
     if isinstance(address, SerialFc):
-        path = address.path
-
-        async def open_path() -> serial.Serial:
-            return open_serial(path)
-
-        return open_path
+        return partial(BackgroundThread("serial port").ask, partial(open_serial, address.path))
     if isinstance(address, TcpFc):
         return partial(_open_tcp, address, BackgroundThread("name lookup"))
     if isinstance(address, UdpFc):
@@ -69,7 +64,7 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
 
 
 def open_serial(path: str) -> serial.Serial:
-    """Open a serial port for exclusive use. Raises PortError if that fails."""
+    """Open a serial port for exclusive use; PortError if that fails. It searches all processes for a login console."""
     console = find_console(path)
     if console is not None:
         raise PortInUseError(

@@ -5,6 +5,7 @@ import asyncio
 import os
 from collections import deque
 from contextlib import suppress
+from functools import partial
 
 import serial
 import structlog
@@ -16,6 +17,7 @@ from service.links.fc_device import DEVICE_ERRORS, PortError, open_serial
 from service.links.gcs_events import GcsEvents
 from service.links.tcp_link import must_arrive
 from service.machine.log_setup import warn_once
+from service.machine.threads import BackgroundThread
 from service.settings.addresses import GcsAddress
 from storage.os_error import reason
 
@@ -48,7 +50,9 @@ class SerialLink:
         self._free_at = 0.0
         self._warned: set[str] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self._open()
+        self._thread = BackgroundThread("telemetry radio")
+        self._opening: asyncio.Task[None] | None = None
+        self._begin_to_open()
 
     def send(self, peer: Peer, data: bytes) -> None:
         if self._port is None:
@@ -61,6 +65,8 @@ class SerialLink:
             self._write_when_free()
 
     def close(self) -> None:
+        if self._opening is not None:
+            self._opening.cancel()
         if self._timer is not None:
             self._timer.cancel()
         if self._port is not None:
@@ -68,22 +74,28 @@ class SerialLink:
             with suppress(*DEVICE_ERRORS):
                 self._port.close()
 
-    def _open(self) -> None:
+    def _begin_to_open(self) -> None:
+        self._opening = self._loop.create_task(self._open())
+
+    async def _open(self) -> None:
         try:
-            self._port = open_serial(self._address.host)
+            self._port = await self._thread.ask(partial(open_serial, self._address.host))
             self._port.baudrate = self._address.port
         except (PortError, *DEVICE_ERRORS) as error:
             self._port = None
-            path = self._address.host
-            why = reason(error) if os.path.exists(path) else f"{path} is missing: plug the radio in"
-            warn_once(self._warned, "gcs.unavailable", link=self.name, why=why)
-            self._timer = self._loop.call_later(_REOPEN_S, self._open)
+            self._warn(error)
+            self._timer = self._loop.call_later(_REOPEN_S, self._begin_to_open)
             return
         _log.info("gcs.port_open", link=self.name)
         self._warned.clear()
         self._loop.add_reader(self._port.fileno(), self._readable)
         # Like a TCP client, a station behind a radio hears the vehicle from the start.
         self._events.add_default_peer(self._peer)
+
+    def _warn(self, error: Exception) -> None:
+        path = self._address.host
+        why = reason(error) if os.path.exists(path) else f"{path} is missing: plug the radio in"
+        warn_once(self._warned, "gcs.unavailable", link=self.name, why=why)
 
     def _lost(self, why: str) -> None:
         self.close()
@@ -93,7 +105,7 @@ class SerialLink:
         warn_once(self._warned, "gcs.unavailable", link=self.name, why=why)
         self._events.remove_default_peer(self._peer)
         self._events.gcs_gone(self._peer)
-        self._timer = self._loop.call_later(_REOPEN_S, self._open)
+        self._timer = self._loop.call_later(_REOPEN_S, self._begin_to_open)
 
     def _readable(self) -> None:
         assert self._port is not None

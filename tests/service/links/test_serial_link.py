@@ -66,6 +66,7 @@ def radio(tmp_path: Path) -> Iterator[Radio]:
 
 async def test_a_station_is_heard_without_the_radios_own_reports(links: Links, radio: Radio, tmp_path: Path) -> None:
     link = links.open(f"{tmp_path}/ttyUSB1,57600")
+    await until_async(lambda: links.events.default_peers, "the open port")
     (peer,) = links.events.default_peers
     writer, station = FrameWriter(51, 68), FrameWriter(255, 190)
     report = writer.frame(pack(m.MAVLink_radio_status_message(100, 100, 90, 0, 0, 0, 0)), 1)
@@ -79,6 +80,7 @@ async def test_a_station_is_heard_without_the_radios_own_reports(links: Links, r
 
 async def test_more_telemetry_than_the_line_carries_is_dropped(links: Links, radio: Radio, tmp_path: Path) -> None:
     link = links.open(f"{tmp_path}/ttyUSB1,57600")
+    await until_async(lambda: links.events.default_peers, "the open port")
     (peer,) = links.events.default_peers
     writer, sent = FrameWriter(1, 1), 0
     for number in range(300):
@@ -97,6 +99,7 @@ async def test_more_telemetry_than_the_line_carries_is_dropped(links: Links, rad
 
 async def test_a_full_radio_gets_less(links: Links, radio: Radio, tmp_path: Path) -> None:
     link = links.open(f"{tmp_path}/ttyUSB1,57600")
+    await until_async(lambda: links.events.default_peers, "the open port")
     (peer,) = links.events.default_peers
     writer = FrameWriter(1, 1)
 
@@ -122,6 +125,7 @@ async def test_an_unplugged_radio_comes_back(
 ) -> None:
     monkeypatch.setattr(serial_link, "_REOPEN_S", 0.01)
     link = links.open(f"{tmp_path}/ttyUSB1,57600")
+    await until_async(lambda: links.events.default_peers, "the open port")
     (peer,) = links.events.default_peers
     radio.unplug()
     await until_async(lambda: links.events.gone == [peer], "the end")
