@@ -3,7 +3,6 @@
 
 import re
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -15,13 +14,6 @@ from service.settings.key import Example, Unfit, file_name, several, text
 _ENDPOINT = re.compile(r"(?:tcp|udp|tls|quic|ws)/[^/]+:\d{1,5}(?:[?#].*)?|(?!tcp|udp|tls|quic|ws)[a-z-]+/.+")
 #: The value that allows commands without authentication.
 I_KNOW = "I know"
-
-
-class ZenohProfile(Enum):
-    """The data volume of a vehicle's link."""
-
-    FULL = "full"
-    METERED = "metered"
 
 
 def _endpoint(entry: object, _folder: Path) -> str:
@@ -46,10 +38,6 @@ class ZenohSettings:
         "This vehicle's name, the second chunk; unique within a fleet. By default the host's name.",
         Example('"naze-1"'),
     ] = field(default_factory=host_name)
-    profile: Annotated[
-        ZenohProfile,
-        "Data volume: full sends each sample; metered a group every 5 s, or 30 s if unchanged, but arming at once.",
-    ] = ZenohProfile.FULL
     connect: Annotated[
         tuple[str, ...],
         several('as in ["tcp/192.168.4.1:7447"]', _endpoint),

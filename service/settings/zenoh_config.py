@@ -8,7 +8,7 @@ import zenoh
 
 from payloads.endpoints import all_endpoints, in_short, read_zenoh_file
 from payloads.names import ZenohSettingsError
-from service.settings.zenoh import I_KNOW, ZenohProfile, ZenohSettings
+from service.settings.zenoh import I_KNOW, ZenohSettings
 from storage.os_error import reason
 
 #: Commands up to 10 MB get a reply. Larger commands are not assembled in a Pi's memory.
@@ -29,10 +29,6 @@ _DEFAULTS: dict[str, object] = {
     # It takes 16 MB and helps only programs on the same machine.
     "transport/shared_memory/enabled": False,
 }
-#: A silent session counts as lost after this time, and sends four empty messages within it. Samples every 5 s replace
-#: those on a metered link.
-_LEASE = "transport/link/tx/lease"
-_METERED_LEASE_MS = 30_000
 _AUTHENTICATED = ("tls/", "quic/")
 
 
@@ -43,8 +39,6 @@ def make_config(settings: ZenohSettings) -> zenoh.Config:
     for key, value in _DEFAULTS.items():
         if json.loads(config.get_json(key)) == json.loads(usual.get_json(key)):
             config.insert_json5(key, json.dumps(value))
-    if settings.profile is ZenohProfile.METERED and config.get_json(_LEASE) == usual.get_json(_LEASE):
-        config.insert_json5(_LEASE, str(_METERED_LEASE_MS))
     for setting, endpoints in (("connect", settings.connect), ("listen", settings.listen)):
         if endpoints:
             try:

@@ -11,6 +11,7 @@ Anything that may wait takes the session's thread:
 import asyncio
 from collections.abc import Callable
 from functools import partial
+from math import inf
 
 import structlog
 import zenoh
@@ -29,18 +30,17 @@ from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
 from service.daemon.telemetry_logs import TelemetryLogs
 from service.recording.tlog_recorder import TLOG_FOLDER
-from service.settings.zenoh import ZenohProfile, ZenohSettings
+from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link.answers import Answers, CommandQueries, mission_current, mission_report
 from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
-from service.zenoh_link.rates import SampleRates
 from service.zenoh_link.session import SessionThread, log_outages
 from service.zenoh_link.time_source import SampleClock
 
-_STATE_INTERVAL_S = 1.0
+_STATE_INTERVAL_S, _OVERVIEW_INTERVAL_S = 1.0, 10.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
 
 _log = structlog.get_logger()
@@ -64,12 +64,14 @@ class Node(Follower):
         self._queries = Queries(self._payloads, self._thread)
         api = DaemonApi(daemon)
         logs = None if daemon.settings.state_dir is None else daemon.settings.state_dir / TLOG_FOLDER
-        self._rates = SampleRates(is_metered=settings.profile is ZenohProfile.METERED)
         self._logs = TelemetryLogs(logs)
         self._answerers = Answers(self._state, daemon.bridge, api).answerers
         if settings.commands:
             self._answerers |= CommandQueries(api, self._presence.others, self._logs).answerers
         self._held: HeldMission | None = None
+        #: The overview's urgent values as last published, and when the next one is due without a change of these.
+        self._overview_marks: object = None
+        self._overview_due = -inf
         self._pending_publish: asyncio.Handle | None = None
         self._tick: asyncio.TimerHandle | None = None
         self._outages: asyncio.Task[None] | None = None
@@ -153,13 +155,10 @@ class Node(Follower):
             **plain(self._daemon.report()),
         }
 
-    def _publish(self, group: Group, *, gathered: bool = False) -> None:
+    def _publish(self, group: Group) -> None:
         key = keys.TELEMETRY[group]
         if self._publisher.has_readers(key):
-            now = self._loop.time()
-            sample = self._daemon.bridge.group(group, now)
-            if self._rates.admits(group, sample, now, gathered=gathered):
-                self._publisher.put(key, plain(sample))
+            self._publisher.put(key, plain(self._daemon.bridge.group(group, self._loop.time())))
 
     def _send_reliably(self, key: ZenohKey, body: Callable[[], Json]) -> None:
         """Publish on the session's thread, which also makes the body: for a long list that takes time."""
@@ -177,15 +176,14 @@ class Node(Follower):
 
     def _publish_whole(self) -> None:
         self._pending_publish = None
-        for group in {Group.LINK, *self._rates.held_back}:
-            self._publish(group, gathered=True)
-        state = self._state()
-        marks = (state["status"]["armed"], state["mission"], state["link"]["state"], state["others_of_this_name"])
-        if self._publisher.is_declared and self._rates.admits_state(marks, self._loop.time()):
+        self._publish(Group.LINK)
+        state, now = self._state(), self._loop.time()
+        if self._publisher.is_declared:
             self._publisher.put(keys.STATE, state)
         if self._publisher.has_readers(keys.OVERVIEW):
             overview = overview_of(state)
-            if self._rates.admits_overview(overview.marks, self._loop.time()):
+            if now >= self._overview_due or overview.marks != self._overview_marks:
+                self._overview_due, self._overview_marks = now + _OVERVIEW_INTERVAL_S, overview.marks
                 self._publisher.put(keys.OVERVIEW, plain(overview))
         held = self._daemon.bridge.missions.held
         if held is not self._held:

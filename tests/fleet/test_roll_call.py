@@ -26,8 +26,6 @@ from tests.support.zenoh_bench import ask_surely
 #: At this speed 146 records take seconds, enough time to inject a fault.
 _SLOW_BAUD = 9600
 _COUNT = 146
-#: On a metered link a hung vehicle is considered alive for 30 s instead of 10.
-_METERED = f'{I_KNOW}profile = "metered"\n'
 _FLEET = [*NAZE_BRIDGE, "fleet"]
 
 
@@ -37,8 +35,12 @@ def module_fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     with ExitStack() as stack:
         fleet = Fleet(tmp_path_factory.mktemp("fleet"), stack)
         board = fleet.board("snail", "--baud", str(_SLOW_BAUD))
-        fleet.start("kite", commands=_METERED)
-        fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}", commands=_METERED)
+        # A hung vehicle is considered alive for 30 s instead of 10.
+        lease = fleet.folder / "lease.json5"
+        lease.write_text("{transport: {link: {tx: {lease: 30000}}}}")
+        commands = f'{I_KNOW}config_file = "{lease}"\n'
+        fleet.start("kite", commands=commands)
+        fleet.start("snail", fc=f"{board.link},{_SLOW_BAUD}", commands=commands)
         yield fleet
 
 

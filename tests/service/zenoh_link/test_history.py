@@ -13,7 +13,7 @@ from zenoh import ext
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan
 from tests.support.programs import until
-from tests.support.zenoh_bench import I_KNOW, Reader, ask_surely, body, endpoint, key, session, zenoh_bench
+from tests.support.zenoh_bench import Reader, ask_surely, body, endpoint, key, session, zenoh_bench
 from tests.support.zenoh_router import running_router
 
 DAY = timedelta(days=1)
@@ -96,15 +96,3 @@ def test_replies_and_samples_have_a_time(start: Starter) -> None:
         assert reply.ok is not None
         assert reply.ok.timestamp is not None
         assert body(reply.ok)["time_source"] in {"gps", "ntp", "pi"}
-
-
-def test_a_metered_link_is_quiet_except_for_arming(start: Starter) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'listen = ["{where}"]\nprofile = "metered"\n{I_KNOW}')
-    with session(connect=where) as opened:
-        reader = Reader(opened)
-        reader.wait("telemetry/status")
-        bench.board.set("armed 1")
-        reader.wait("telemetry/status", lambda status: status["armed"])
-        # Unchanged groups are sent every 30 s.
-        assert [status["armed"] for status in reader.of("telemetry/status")].count(True) == 1
