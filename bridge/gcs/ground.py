@@ -16,7 +16,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkFrame
 
 #: A UDP station that is silent for this long has left. A TCP station leaves with the connection.
-EXPIRY_S = 60.0
+_EXPIRY_S = 60.0
 #: This time applies to a station that has not shown that it receives anything.
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
@@ -125,7 +125,7 @@ class Ground:
         for station in [*self._heard.values()]:
             if now >= station.bad_news.due:
                 station.say_again(now)
-            if now >= station.heard_at + EXPIRY_S:
+            if now >= station.heard_at + _EXPIRY_S:
                 self._leaves(station)
         for peer, station in [*self._unproven.items()]:
             if now >= station.heard_at + _UNPROVEN_S:

@@ -6,7 +6,7 @@ from math import inf
 import pytest
 
 from bridge.line.conversation import Send
-from bridge.line.msp_link import MAX_OUTSTANDING_BYTES, MspLink, byte_time_s
+from bridge.line.msp_link import MspLink, byte_time_s
 from bridge.line.poll_schedule import PollSchedule
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, frame_size, request
@@ -92,7 +92,7 @@ def test_a_slow_line_is_read_every_20_ms() -> None:
 
 def test_does_not_read_anything_late_while_a_request_waits_for_room() -> None:
     link = asking(poll(Msp.STATUS), poll(Msp.RC))
-    link.send(Send(request(Msp.IDENT), Msp.IDENT, MAX_OUTSTANDING_BYTES), NOW)
+    link.send(Send(request(Msp.IDENT), Msp.IDENT, 224), NOW)
     assert link.awaits(Msp.IDENT)
     assert link.complete_at == -inf
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from protocols.firmware_image import FLASH_SIZE
 from simulator.naze.whole_flash import stand_in
 from tests.service.cli.test_mission_commands import assert_one_sentence
 from tests.support.programs import run_naze_bridge
@@ -31,7 +30,7 @@ def test_a_missing_file_and_a_wrong_backup_are_reported_in_one_sentence(tmp_path
     assert_one_sentence(run_naze_bridge("firmware", "flash", tmp_path / "x.hex"), 2, "x.hex")
     part = tmp_path / "x.bin"
     part.write_bytes(stand_in(patched=True))
-    assert_one_sentence(run_naze_bridge("firmware", "restore", part), 2, f"a backup has {FLASH_SIZE} bytes")
+    assert_one_sentence(run_naze_bridge("firmware", "restore", part), 2, "a backup has 131072 bytes")
 
 
 def tool(folder: Path, name: str, prints: str = "") -> None:
