@@ -135,19 +135,8 @@ class Bridge:
         #: Missions, for the command line, the page and zenoh.
         self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
         # The board's settings, and other programs' requests.
-        sharing = self._sharing = MspSharing(
-            session, missions, ground, emit, lambda now: self._board_settings.may_have_changed(now)
-        )
-        settings = self._board_settings = BoardSettings(
-            session,
-            missions,
-            ground,
-            emit,
-            config.settings_memory,
-            lambda: self.missions.transfer is not None,
-            lambda: sharing.due < inf,
-            lambda table: self._parameters.take(table),
-        )
+        settings = self._board_settings = BoardSettings(session, missions, ground, emit, config.settings_memory)
+        sharing = self._sharing = MspSharing(session, missions, ground, emit, settings)
         #: Settings, for the command line, the page and zenoh.
         self.settings = LocalSettings(settings, session)
         # The vehicle that ground stations see.
@@ -388,6 +377,8 @@ class Bridge:
             if FlightState in news:
                 self._follow_arming(now)
                 self._remember_flight(now)
+        if self._board_settings.known.table is not self._parameters.followed:
+            self._parameters.follow()
         if self._sharing.due < inf:
             self._sharing.tick(now)
 

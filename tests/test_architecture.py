@@ -26,7 +26,15 @@ BRIDGE = {
     "bridge.controllers": {"bridge.voice", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.gcs": {"bridge.voice", "bridge.model"},
     "bridge.settings": {"bridge.voice", "bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
-    "bridge.sharing": {"bridge.voice", "bridge.gcs", "bridge.fc", "bridge.missions", "bridge.line", "bridge.model"},
+    "bridge.sharing": {
+        "bridge.voice",
+        "bridge.settings",
+        "bridge.gcs",
+        "bridge.fc",
+        "bridge.missions",
+        "bridge.line",
+        "bridge.model",
+    },
     "bridge.transfers": {"bridge.voice", "bridge.gcs", "bridge.missions", "bridge.line", "bridge.model"},
     "bridge.vehicle": {
         "bridge.voice",

@@ -13,9 +13,8 @@ from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Pause, ask, ask_surely
 from bridge.model.settings import BoardSetting, SettingTable, Value, ValueKind, table_of
 from bridge.voice import sentences
-from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
-from protocols.msp.frame import Direction, request
+from protocols.msp.frame import Direction, is_clean, request
 from protocols.msp.mode_ranges import range_writes, ranges_text
 from protocols.msp.settings import SETTINGS, Field, Part, SettingsRequest, fields
 from protocols.msp.telemetry import decode_box_names

@@ -148,6 +148,7 @@ class Sender:
 
     def __init__(self, station: "GroundStation", sysid: int, compid: int) -> None:
         self.station, self.sysid, self.compid = station, sysid, compid
+        self._text = f"{station.peer} sysid {sysid} compid {compid}"
         self.heard_at = -inf
         #: The number of the last frame, and of the newest one with the bytes.
         self.number = 0
@@ -197,7 +198,7 @@ class Sender:
         return f"{self.peer.host} sysid {self.sysid} compid {self.compid}"
 
     def __str__(self) -> str:
-        return f"{self.peer} sysid {self.sysid} compid {self.compid}"
+        return self._text
 
     def to(self, *together: Message) -> None:
         """Answer with messages in one datagram, unless the station has left."""

@@ -15,9 +15,9 @@ from operator import attrgetter
 
 from bridge.line.conversation import Send
 from protocols.frsky import FRSKY_SPEED
-from protocols.msp.command_line import EchoWatch, is_clean
+from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
-from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
+from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, is_clean, request
 
 #: Harakiri's ring, less one heartbeat (25 bytes) that it may send unprompted in AUTOSENSE, and a margin.
 MAX_OUTSTANDING_BYTES = 224

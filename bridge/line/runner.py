@@ -73,6 +73,8 @@ class Runner:
         #: The time of the next `tick`, or infinity while nothing is awaited.
         self.due = inf
         self._busy = False
+        #: True while requests of other programs wait for the line.
+        self.programs_wait = False
 
     @property
     def is_busy(self) -> bool:

@@ -134,8 +134,6 @@ class MissionService:
         #: The mission store of the current flight controller, or the reply to every attempt.
         self.fc_store: AnyFcMissionStore | Refusal = NO_LINK
         self._owner: object | None = None
-        #: Called when a transfer has ended, and another may begin.
-        self.on_released: Callable[[], None] = lambda: None
         self._closed = False
         self._flies_mission = False
         #: False until the current flight controller's list was read, and after an interrupted push.
@@ -151,6 +149,8 @@ class MissionService:
         self._former_until = -inf
         #: Set while records are written and verified.
         self.writing: MissionTransfer | None = None
+        #: True while a ground station's list arrives.
+        self.is_arriving = False
 
     def run(
         self, conversation: Conversation[T | Refusal], on_done: Callable[[T | Refusal, float], None], now: float
@@ -253,7 +253,6 @@ class MissionService:
         """A transfer has ended, whether or not it had the lock."""
         if self._owner is owner:
             self._owner = None
-        self.on_released()
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller if it can take a list now."""

@@ -55,9 +55,6 @@ class BoardSettings:
 
     >>> settings.change("p_roll", 44, on_done, now, client="the page")  # on_done gets it as read back
     >>> settings.save(on_done, now)
-
-    `is_transferring`: True while a mission is received or written. `others_wait`: while others wait for a reply from
-    the board. `on_table`: called when the table has changed.
     """
 
     def __init__(
@@ -67,19 +64,14 @@ class BoardSettings:
         ground: Ground,
         emit: Callable[[BridgeEvent | TakenBackup], None],
         memory: SettingsMemory,
-        is_transferring: Callable[[], bool],
-        others_wait: Callable[[], bool],
-        on_table: Callable[[SettingTable], None],
     ) -> None:
         self._session = session
         self._missions = missions
         self._ground = ground
         self._emit = emit
-        self._is_transferring = is_transferring
-        self._others_wait = others_wait
-        self._on_table = on_table
         self.known = KnownSettings(memory)
         self._controller: FlightController | None = None
+        self._arm_bit: int | None = None
         self._fc_settings: FcSettings | None = None
         self._work: list[SettingWork] = []
         #: Clients that wait for the table, with their deadlines.
@@ -107,7 +99,7 @@ class BoardSettings:
             return ARMED
         if self._fc_settings is None:
             return _NO_BOARD
-        if self._missions.occupied() is not None or self._is_transferring():
+        if self._missions.occupied() is not None or self._missions.is_arriving:
             return _OCCUPIED
         return None if armed is False else _UNREAD
 
@@ -117,6 +109,7 @@ class BoardSettings:
         """Follow another flight controller, or another protocol of the same, or None if it was lost."""
         opens = None if controller is None else controller.profile.settings
         self._controller = controller
+        self._arm_bit = None if controller is None else controller.arm_bit
         self._fc_settings = fc_settings = None if opens is None or controller is None else opens(controller)
         self.known.found()
         self._stop_reading()
@@ -197,10 +190,8 @@ class BoardSettings:
         self.due = min(next_at, waits_until)
 
     def _begin(self, work: SettingWork, now: float) -> None:
-        controller, fc_settings = self._controller, self._fc_settings
-        arm_bit = None if controller is None else controller.arm_bit
-        answer = self._known_answer(work, arm_bit)
-        if answer is not None or controller is None or fc_settings is None:
+        fc_settings, answer = self._fc_settings, self._known_answer(work)
+        if answer is not None or fc_settings is None:
             self._work.remove(work)
             work.end(_NO_BOARD if answer is None else answer, now)
             return
@@ -228,9 +219,9 @@ class BoardSettings:
         work.advance(WorkEvent.TURN)
         self._is_on_line = True
         is_change = isinstance(work, SettingChange)
-        self._missions.runner.start(work.carry_out(fc_settings, arm_bit), done, now, in_background=is_change)
+        self._missions.runner.start(work.carry_out(fc_settings, self._arm_bit), done, now, in_background=is_change)
 
-    def _known_answer(self, work: SettingWork, arm_bit: int | None) -> Answer | None:
+    def _known_answer(self, work: SettingWork) -> Answer | None:
         """The answer without asking the board, if there is one."""
         table, obstacle = self.known.table, self.obstacle()
         if not isinstance(work, SettingChange):
@@ -249,7 +240,7 @@ class BoardSettings:
             return out_of_range(setting, value)
         if setting.holds(value):
             return (setting,)
-        return _NO_ARM_FLAG if arm_bit is None else None
+        return _NO_ARM_FLAG if self._arm_bit is None else None
 
     def _changed(self, work: SettingChange, result: Answer, now: float) -> Answer:
         """The answer to a change, from the settings read back."""
@@ -259,8 +250,7 @@ class BoardSettings:
             if result.cause is Cause.NO_ANSWER and work.may_have_acted:
                 self.known.unsaved[before.name] = work.value
             return result
-        if table := self.known.changed(result):
-            self._on_table(table)
+        self.known.changed(result)
         after = next((each for each in result if each.name == before.name), before)
         if not after.holds(work.value):
             return SettingRefusal(Cause.REFUSED, sentences.REFUSED_BY_BOARD(before.name, shown(after.value)))
@@ -282,7 +272,7 @@ class BoardSettings:
         fc_settings, runner = self._fc_settings, self._missions.runner
         if self._session.vehicle.armed or fc_settings is None:
             self._stop_reading()
-        if fc_settings is None or self._others_wait() or runner.needs_line or self.obstacle() is not None:
+        if fc_settings is None or runner.programs_wait or runner.needs_line or self.obstacle() is not None:
             return
         if self._reading is None:
             self._reading = self._whole(fc_settings)
@@ -309,9 +299,7 @@ class BoardSettings:
     def _whole(self, fc_settings: FcSettings) -> Conversation[SettingTable | None]:
         controller, known = self._controller, self.known
         if known.board is None and controller is not None and controller.profile.spoken is Spoken.MSP:
-            remembered = known.identified((yield from _identify(controller)))
-            if remembered is not None:
-                self._on_table(remembered)
+            known.identified((yield from _identify(controller)))
         is_doubtful = known.freshness <= Freshness.DOUBTFUL
         return (yield from fc_settings.read(known.table, TableReading(self._pace, is_doubtful)))
 
@@ -328,7 +316,6 @@ class BoardSettings:
         if is_first or reading.changed:
             names = ", ".join(reading.changed[:_MOST_NAMED])
             self._emit(SettingsRead(settings=len(table), changed=names, left_out=table.left_out))
-            self._on_table(table)
         if reading.elsewhere is not None:
             self._report(reading.elsewhere)
         if reading.backup is not None:

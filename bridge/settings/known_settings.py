@@ -72,16 +72,14 @@ class KnownSettings:
         self.freshness, self.board = Freshness.UNREAD, None
         self._occasion = Occasion.CONNECTED
 
-    def identified(self, board: BoardId) -> SettingTable | None:
-        """Returns the table as last read, if the board is known by its chip's number: an INAV takes 20 s to read."""
+    def identified(self, board: BoardId) -> None:
+        """Recall the table as last read, if the board is known by its chip's number: an INAV takes 20 s to read."""
         self.board = board
         if self._is_ours:
             self._memory.keep(board, {})
         values = self._memory.recall(board)
-        if not (board.uid and values) or (self.state is not None and self.state.board == board):
-            return None
-        self.table = remembered_table(values)
-        return self.table
+        if board.uid and values and (self.state is None or self.state.board != board):
+            self.table = remembered_table(values)
 
     def may_have_changed(self, freshness: Freshness = Freshness.DOUBTFUL) -> None:
         """The bridge, or a program through it, may have changed settings: the differences found next are no news."""
@@ -90,12 +88,10 @@ class KnownSettings:
         if self.board is not None:
             self._memory.keep(self.board, {})  # the daemon may end before the next reading
 
-    def changed(self, settings: Sequence[BoardSetting]) -> SettingTable | None:
-        """The settings read back after a change through the bridge. Returns the table if it has changed."""
+    def changed(self, settings: Sequence[BoardSetting]) -> None:
+        """The settings read back after a change through the bridge."""
         self.may_have_changed(Freshness.CHANGED)
-        former = self.table or SettingTable()
-        self.table = former.updated(*settings)
-        return self.table if self.table.settings != former.settings else None
+        self.table = (self.table or SettingTable()).updated(*settings)
 
     def saved(self) -> None:
         """The board has saved the settings. A firmware may correct some that contradict each other."""

@@ -9,7 +9,7 @@ Ground stations keep the number of parameters that they heard first, so a list w
 is sent again to the stations that had got a shorter one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from math import inf, isclose, isfinite
@@ -22,15 +22,13 @@ from bridge.gcs.ground_station import Sender
 from bridge.model.settings import BoardSetting, SettingTable, ValueKind, shown
 from bridge.model.vehicle import Health, Orientation, Readiness, Vehicle
 from bridge.settings.board_settings import BoardSettings
-from bridge.settings.parameter_files import GENERAL_URI, ParameterFiles
 from bridge.settings.parameter_names import parameter_names
 from bridge.settings.setting_work import Answer
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from protocols.float32 import single
-from protocols.mavlink.codec import pack, pack_component_metadata
+from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
-from protocols.mavlink.ftp import FtpSession, file_crc32, is_opening
 from protocols.msp.inav import ARMING_BLOCKERS
 from protocols.msp.telemetry import Sensor
 
@@ -102,26 +100,27 @@ class OwnParameters:
 class _Dialogue:
     """The parameters sent to a sender. next: the index in the list being sent, or None. count: of the last list."""
 
-    session: FtpSession
     next: int | None = None
     count: int = 0
     awaits_list: bool = False
 
 
 class Parameters:
-    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET, and requests for files."""
+    """Answers PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET."""
 
     def __init__(self, own: OwnParameters, settings: BoardSettings, ground: Ground) -> None:
         self._own = own
         self._settings = settings
         self._ground = ground
+        #: The table that the following come from, and the one that stations know.
+        self._table: SettingTable | None = None
+        self.followed: SettingTable | None = None
         #: The settings that are numbers, and their names, by parameter.
         self._named: Mapping[str, BoardSetting] = {}
         self._held: dict[str, float] = {}
         self._names: Mapping[str, str] = {}
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
-        self._files = ParameterFiles()
         self._dialogues: WeakKeyDictionary[Sender, _Dialogue] = WeakKeyDictionary()
         #: The time of the next `tick`, or infinity while no list is sent.
         self.due = inf
@@ -206,35 +205,28 @@ class Parameters:
             self._error(sender, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
         self._send(sender, name)
 
-    def answer_file(self, sender: Sender, payload: Sequence[int], now: float) -> None:
-        """FILE_TRANSFER_PROTOCOL."""
-        dialogue = self._dialogue(sender)
-        self._files.show(self._values(), self._described())
-        if is_opening(payload):
-            # Changes that were not made through the bridge follow as PARAM_VALUE.
-            self._settings.current(lambda _table, _at: None, now, _LIST_WITHIN_S)
-        for number, answer in enumerate(dialogue.session.answer(payload)):
-            if number and not sender.station.allows(Cost.ANSWER):
-                return
-            sender.to(messages.MAVLink_file_transfer_protocol_message(0, sender.sysid, sender.compid, answer))
-
-    def metadata(self, uptime_ms: int) -> Message | None:
-        """COMPONENT_METADATA, which names the file with the descriptions, or None before the settings are known."""
-        if not self._described():
-            return None
-        self._files.show(self._values(), self._described())
-        crc = file_crc32(self._files.general())
-        return pack_component_metadata(uptime_ms, crc, GENERAL_URI)
-
     def follow(self) -> None:
-        """Send the values that have changed to all stations, which keep a copy, once any has read them."""
-        if not self._told:
+        """Send the values that have changed to all stations, which keep a copy, once any has read them.
+
+        With more or fewer parameters, those that have got a list get it again.
+        """
+        table = self._settings.known.table
+        if not self._told and table is self.followed:
             return
-        before, self._told = self._told, self._values()
+        self.followed = table
+        before, values = self._told, self._values()
+        if not before:
+            return
+        self._told = values
         if before.keys() == self._told.keys():
             for index, (name, value) in enumerate(self._told.items()):
                 if before[name] != value:
                     self._ground.broadcast(_message(name, value, len(before), index))
+            return
+        for dialogue in self._dialogues.values():
+            if 0 < dialogue.count != len(self._told) and dialogue.next is None:
+                dialogue.next = 0
+                self.due = -inf
 
     def tick(self, now: float) -> None:
         """Send the next parameters of each list."""
@@ -257,11 +249,11 @@ class Parameters:
 
     def _dialogue(self, sender: Sender) -> _Dialogue:
         if sender not in self._dialogues:
-            self._dialogues[sender] = _Dialogue(FtpSession(self._files.find))
+            self._dialogues[sender] = _Dialogue()
         return self._dialogues[sender]
 
-    def take(self, table: SettingTable) -> None:
-        """The settings were read, or some have changed."""
+    def _name(self, table: SettingTable) -> None:
+        """Give the board's settings their names."""
         numbers = {setting.name: setting for setting in table if setting.kind is not ValueKind.TEXT}
         if numbers.keys() != {*self._names.values()}:
             self._names = parameter_names(numbers, (*self._own.values(), WP_RADIUS))
@@ -269,20 +261,13 @@ class Parameters:
         radius = self._named.get(_RADIUS)
         alias = {} if radius is None or radius.fixed else {WP_RADIUS: radius}
         self._held = {parameter: float(setting.value) for parameter, setting in (alias | self._named).items()}
-        self.follow()
-        count = len(self._values())
-        for dialogue in self._dialogues.values():
-            if 0 < dialogue.count != count and dialogue.next is None:
-                dialogue.next = 0
-                self.due = -inf
-
-    def _described(self) -> Mapping[str, BoardSetting]:
-        """The settings for the files, or none while only their values are known."""
-        table = self._settings.known.table
-        return {} if table is None or table.is_remembered else self._named
 
     def _values(self) -> dict[str, float]:
-        """Every parameter. The bridge's own keep their indexes on every board."""
+        """Every parameter, as the settings are known now. The bridge's own keep their indexes on every board."""
+        table = self._settings.known.table
+        if table is not None and table is not self._table:
+            self._table = table
+            self._name(table)
         return self._own.values() | self._held
 
     def _send(self, sender: Sender, name: str) -> None:

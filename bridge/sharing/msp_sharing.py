@@ -8,7 +8,6 @@ program is disconnected, because programs misread MSP's error reply: INAV Config
 """
 
 from collections import Counter, deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
@@ -21,10 +20,10 @@ from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_
 from bridge.line.msp_link import MspLink
 from bridge.missions.mission_service import MissionService
 from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
+from bridge.settings.board_settings import BoardSettings
 from bridge.sharing.program import Program, WaitingRequest
 from bridge.voice import sentences
-from protocols.msp.command_line import is_clean
-from protocols.msp.frame import Direction, MspFrame, frame_size
+from protocols.msp.frame import Direction, MspFrame, frame_size, is_clean
 from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
 from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
@@ -48,16 +47,13 @@ _ARMED, _NO_REPLY = "armed", "no reply from the flight controller"
 
 @dataclass(eq=False)
 class MspSharing:
-    """`_on_change` is called after a request that may have changed settings.
-
-    `refused`: requests that were refused or not answered in time, by reason.
-    """
+    """`refused`: requests that were refused or not answered in time, by reason."""
 
     _session: FcSession
     _missions: MissionService
     _ground: Ground
     _emit: Emit
-    _on_change: Callable[[float], None]
+    _settings: BoardSettings
     _programs: deque[Program] = field(default_factory=deque)  # the next program to have a request forwarded first
     _total: TokenBucket = field(default_factory=partial(TokenBucket, _TOTAL))
     _forwarded: WaitingRequest | None = None
@@ -104,7 +100,8 @@ class MspSharing:
             self._forward_next(now)
         deadlines = [request.until for program in self._programs for request in program.waiting if request.until > now]
         again = now + _LOOK_AGAIN_S if self._free_at <= now else min(self._free_at, now + _LOOK_AGAIN_S)
-        self.due = min([again, *deadlines]) if any(program.waiting for program in self._programs) else inf
+        self._missions.runner.programs_wait = any(program.waiting for program in self._programs)
+        self.due = min([again, *deadlines]) if self._missions.runner.programs_wait else inf
 
     def _answer(self, program: Program, now: float) -> None:
         """Answer or refuse a program's requests, those of the same command in order. A change holds up what follows."""
@@ -186,7 +183,7 @@ class MspSharing:
             if not isinstance(reply, MspFrame):
                 self._free_at = at + _PAUSE_AFTER_LOSS_S
             if request.is_change:
-                self._on_change(at)
+                self._settings.may_have_changed(at)
                 if (link := self._session.state.link) is not None:
                     link.replies.forget()
             if request.is_change and request in program.waiting:

@@ -58,6 +58,8 @@ _EMPTY_PLAN = Refusal(MissionResult.DENIED, sentences.EMPTY_PLAN())
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
+#: An upload that waits for the end of another transfer looks again at this interval.
+_LOOK_AGAIN_S = 0.05
 _AGAIN = Replaced("the station started again")
 
 
@@ -80,7 +82,6 @@ class MissionUploads:
         self.answers = UploadAnswers(ground, missions.mission_type)
         #: The time of the next `tick`, or infinity if there is no upload, and no answer to repeat.
         self.due = inf
-        missions.on_released = self._wake
 
     @property
     def receiving(self) -> MissionTransfer | None:
@@ -207,15 +208,14 @@ class MissionUploads:
             event = self._turn(upload, now)
             if event is not None:
                 self._handle(upload, event, now)
-        self.due = min(self.due, self.answers.due, *(upload.state.due for upload in self._uploads))
+        for upload in self._uploads:
+            self.due = min(self.due, upload.state.due)
+            if isinstance(upload.state, Waiting | Complete):
+                self.due = min(self.due, now + _LOOK_AGAIN_S)
+        self.due = min(self.due, self.answers.due)
 
     def _within(self, *states: type[UploadState]) -> list[Upload]:
         return [upload for upload in self._uploads if isinstance(upload.state, states)]
-
-    def _wake(self) -> None:
-        """A transfer has ended: perhaps an upload may continue at once."""
-        if self._within(Waiting, Complete):
-            self.due = 0.0
 
     # State changes of an upload.
 
@@ -263,6 +263,9 @@ class MissionUploads:
         elif after is Fixed.END:
             self._uploads.remove(upload)
             self._missions.release(upload)
+            self.due = 0.0 if self._uploads else self.due
+        if isinstance(before, Receiving) or isinstance(upload.state, Receiving):
+            self._missions.is_arriving = bool(self._within(Receiving))
         match event:
             case Turn() if isinstance(before, Complete):
                 held = self._missions.held

@@ -28,7 +28,6 @@ from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from bridge.voice import sentences
 from bridge.voice.happening import Happening, Sentence
-from protocols.mavlink.codec import COMPONENT_METADATA
 from protocols.mavlink.dialect import CommandResult, command_name, messages
 from protocols.mission_item import MissionResult
 
@@ -164,12 +163,6 @@ class CommandService:
 
     def _do(self, sender: Sender, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
-            case messages.MAV_CMD_REQUEST_MESSAGE if params[0] == COMPONENT_METADATA:
-                metadata = self._parameters.metadata(round(now * 1000) & 0xFFFFFFFF)
-                if metadata is None:
-                    return CommandResult.TEMPORARILY_REJECTED
-                sender.to(metadata)
-                return CommandResult.ACCEPTED
             case messages.MAV_CMD_REQUEST_MESSAGE:
                 return self._send_once(sender, _msgid(params[0]), now, max(_msgid(params[1]), 0))
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:

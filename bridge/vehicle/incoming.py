@@ -24,11 +24,10 @@ from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.voice import sentences
 from bridge.voice.happening import Sentence
-from protocols.mavlink.codec import FrameWriter, decode, item_from_float_message, item_from_int_message
+from protocols.mavlink.codec import FrameWriter, decode, file_refusal, item_from_float_message, item_from_int_message
 from protocols.mavlink.dialect import MESSAGE_FORMATS, CommandResult, Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mavlink.ftp import refuse
 from protocols.mission_item import MissionItem, MissionResult
 from protocols.rights import Effect
 from protocols.rights.mavlink import effect_of
@@ -139,7 +138,7 @@ class Incoming:
                 s, msg.param_id, msg.param_index, now
             ),
             m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
-            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: lambda s, msg, now: parameters.answer_file(s, msg.payload, now),
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._refuse_file,
             # There are none. Without an answer Mission Planner reads nothing else for 25 s.
             m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: s.to(m.MAVLink_log_entry_message(0, 0, 0, 0, 0)),
             m.MAVLINK_MSG_ID_PING: self._ping,
@@ -177,7 +176,8 @@ class Incoming:
             elif self.routes is not None:
                 self._pass_on(self.routes, sender, frame, effect)
             else:
-                self._record(station, frame)
+                if self._ground.outbox.recorded is not None:
+                    self._record(station, frame)
                 if target in self._our_targets:
                     self._take(sender, frame, msgid, now)
                 elif target[0] == self._ids[0]:
@@ -320,6 +320,10 @@ class Incoming:
         else:
             uploads.item(sender, convert(message), now)
 
+    def _refuse_file(self, sender: Sender, message: Message, _now: float) -> None:
+        if (answer := _denial(message, sender)) is not None:
+            sender.to(answer)
+
     def _heartbeat(self, sender: Sender, message: Message, _now: float) -> None:
         sender.station.behaviour.base_mode = message.base_mode
 
@@ -358,7 +362,7 @@ def _denial(message: Message, sender: Sender) -> Message | None:
             denied_mission = MissionResult.DENIED
             return m.MAVLink_mission_ack_message(sender.sysid, sender.compid, denied_mission, message.mission_type)
         case "FILE_TRANSFER_PROTOCOL":
-            payload = refuse(message.payload)
+            payload = file_refusal(message.payload)
             if payload is not None:
                 return m.MAVLink_file_transfer_protocol_message(0, sender.sysid, sender.compid, payload)
     return None

@@ -2,7 +2,7 @@
 """Decodes and encodes the messages that the bridge itself reads or writes."""
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
@@ -19,10 +19,13 @@ _LAST_V1_ID = 255
 _PYMAVLINK = messages.MAVLink(None)
 _HEADER_V1 = struct.Struct("<BBBBBB")
 _ATTITUDE = struct.Struct("<Iffffff")
-COMPONENT_METADATA = 397
-_COMPONENT_METADATA = struct.Struct("<II100s")
 #: Magic, payload size, both kinds of flags, sequence number, sender's ids, message id's lower 16 and upper 8 bits.
 _HEADER_V2 = struct.Struct("<BBBBBBBHB")
+#: A file transfer's payload: its header, opcodes and errors (FailErrno with EOPNOTSUPP, FileNotFound).
+_FTP = struct.Struct("<HBBBBBBI")
+_FTP_SIZE, _FTP_OPCODE_AT, _FTP_ACK, _FTP_NAK = 251, 3, 128, 129
+_FTP_OF_SESSIONS, _FTP_READS = range(3), (3, 4, 5, 14, 15)
+_FTP_NOT_SUPPORTED, _FTP_NO_FILE = bytes((2, 95)), bytes((10,))
 
 
 def decode(frame: MavlinkFrame) -> Message | None:
@@ -91,7 +94,7 @@ def _sent_fields(msgid: int) -> list[tuple[str, bool]]:
     ]
 
 
-# Messages packed by struct: ATTITUDE, sent ten times a second, and the message that pymavlink lacks.
+# The message sent ten times a second is packed by struct.
 
 
 def pack_attitude(boot_ms: int, *angles_and_rates: float) -> Packed:
@@ -100,10 +103,20 @@ def pack_attitude(boot_ms: int, *angles_and_rates: float) -> Packed:
     return Packed(messages.MAVLINK_MSG_ID_ATTITUDE, payload, payload.rstrip(b"\0") or b"\0")
 
 
-def pack_component_metadata(uptime_ms: int, file_crc: int, uri: str) -> Packed:
-    """COMPONENT_METADATA: the place of the general metadata file, and its `protocols.mavlink.ftp.file_crc32`."""
-    payload = _COMPONENT_METADATA.pack(uptime_ms, file_crc, uri.encode())
-    return Packed(COMPONENT_METADATA, payload, payload.rstrip(b"\0"))
+def file_refusal(payload: Sequence[int]) -> list[int] | None:
+    """The reply to a FILE_TRANSFER_PROTOCOL payload: there are no files. None if it is not a request.
+
+    https://mavlink.io/en/services/ftp.html. Mission Planner repeats a request for 70 s if its reply is another error,
+    QGroundControl then requests the parameters by messages.
+    """
+    request = bytes(payload)
+    if len(request) < _FTP.size or request[_FTP_OPCODE_AT] >= _FTP_ACK:
+        return None
+    seq, session, opcode = _FTP.unpack_from(request)[:3]
+    error = b"" if opcode in _FTP_OF_SESSIONS else _FTP_NO_FILE if opcode in _FTP_READS else _FTP_NOT_SUPPORTED
+    kind = _FTP_NAK if error else _FTP_ACK
+    reply = _FTP.pack((seq + 1) & 0xFFFF, session, kind, len(error), opcode, 0, 0, 0) + error
+    return list(reply.ljust(_FTP_SIZE, b"\0"))
 
 
 class FrameWriter:

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line that shares the port with MSP: the bytes that open it, and how a board in it is recognised.
-
-Harakiri acts on three equal bytes in a row anywhere in the stream, inside frames and across their boundaries (serial.c,
-serialCom): 0x0D enters the command line. In AUTOSENSE '#' does so too, and 'R' resets the board. See
-docs/msp-mission.md, "Masked bodies".
+"""The command line that shares the port with MSP: how a board in it is recognised, and left undisturbed.
 
 In its command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`. A looped-back line
 returns it whole. DEL erases a character of the typed line. This applies to Harakiri (cli.c, tree TestCode3), Baseflight
@@ -11,9 +7,6 @@ and INAV; HarakiriWebstore1 ignores DEL.
 """
 
 from collections import deque
-
-HAZARDS = frozenset((0x0D, 0x23, 0x52))
-RUN_LENGTH = 3
 
 #: Harakiri's, when it waits for a command.
 PROMPT = b"\r\n# "
@@ -26,11 +19,6 @@ _EVIDENCE = 10
 _FRAMES_KEPT = 64
 #: Erases the longest line that can be typed: 64 characters on INAV, 48 on Harakiri.
 RUB_OUT_LINE = _DEL * 64
-
-
-def is_clean(frame: bytes) -> bool:
-    """True if `frame` contains no hazard byte, so that no run can form, not even across frames or after a loss."""
-    return HAZARDS.isdisjoint(frame)
 
 
 def typed_and_rubbed_out(frame: bytes) -> bytes:

@@ -4,13 +4,23 @@
 v1, spoken by all: `$M` direction size command payload xor (MultiWii; Harakiri's serial.c). A reply of 255 bytes or
 more has the size 255, and the size in 16 bits after the command ("jumbo", INAV's msp_serial.c). v2, for INAV's commands
 above 255: `$X` direction flag command size payload crc, command and size 16 bits little-endian, DVB-S2's CRC of 8 bits.
+
+Harakiri acts on three equal bytes in a row anywhere in the stream, inside frames and across their boundaries (serial.c,
+serialCom): 0x0D enters the command line; in AUTOSENSE '#' does so too, and 'R' resets the board. So no frame to it has
+one of these bytes (docs/msp-mission.md, "Masked bodies").
 """
 
 import struct
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial, reduce
+from itertools import filterfalse
+from operator import xor
 
 from fastcrc.crc8 import dvb_s2
+
+HAZARDS = frozenset((0x0D, 0x23, 0x52))
+RUN_LENGTH = 3
 
 _START = b"$"
 _V1, _V2 = ord("M"), ord("X")
@@ -59,7 +69,7 @@ class MspFrame:
             body = bytes((_JUMBO, self.command)) + size.to_bytes(2, "little") + self.payload
         else:
             body = bytes((size, self.command)) + self.payload
-        return b"$M" + direction + body + bytes((_xor(body),))
+        return b"$M" + direction + body + bytes((reduce(xor, body),))
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -68,6 +78,47 @@ def request(command: int, payload: bytes = b"") -> bytes:
 
 def frame_size(command: int, payload_size: int) -> int:
     return payload_size + (_V2_OVERHEAD if command > _HIGHEST_V1_COMMAND else _V1_OVERHEAD)
+
+
+def is_clean(frame: bytes) -> bool:
+    """True if `frame` contains no hazard byte, so that no run can form, not even across frames or after a loss."""
+    return HAZARDS.isdisjoint(frame)
+
+
+def find_mask(body: bytes, fixed_xor: int) -> int | None:
+    """Find the smallest mask that keeps mask, masked body and checksum free of hazards.
+
+    `body` has an even length; `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
+    None if there is no such mask, which cannot happen for bodies of up to 83 bytes.
+    """
+    unfit = {*HAZARDS}
+    checksum_without_mask = reduce(xor, body, fixed_xor)
+    for hazard in HAZARDS:
+        unfit.update(map(partial(xor, hazard), (*body, checksum_without_mask)))
+    return next(filterfalse(unfit.__contains__, range(256)), None)
+
+
+def apply_mask(body: bytes, mask: int) -> bytes:
+    """XOR every byte of `body` with `mask`; the same call removes the mask."""
+    return (int.from_bytes(body) ^ int.from_bytes(bytes((mask,)) * len(body))).to_bytes(len(body))
+
+
+def clean_masked_request(command: int, body: bytes) -> bytes | None:
+    """Encode a request with a masked body; None if its frame would hold a hazard byte with every mask."""
+    size = len(body) + 1
+    mask = find_mask(body, size ^ command)
+    if mask is None:
+        return None
+    frame = request(command, bytes((mask,)) + apply_mask(body, mask))
+    return frame if is_clean(frame) else None
+
+
+def masked_request(command: int, body: bytes) -> bytes:
+    """Encode a request with a masked body of up to 83 bytes."""
+    frame = clean_masked_request(command, body)
+    if frame is None:
+        raise AssertionError(f"a {len(body)} byte body always has a mask")
+    return frame
 
 
 class MspParser:

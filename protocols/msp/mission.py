@@ -5,12 +5,10 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from itertools import filterfalse
 from typing import Any, NamedTuple
 
 from protocols.mission_item import ListIdentity
-from protocols.msp.command_line import HAZARDS, is_clean
-from protocols.msp.frame import request
+from protocols.msp.frame import clean_masked_request, masked_request, request
 
 VERSION = 1
 #: Mask, place and records of a CHUNK must fit a frame's 255 bytes.
@@ -187,44 +185,6 @@ def _reply(layout: struct.Struct, payload: bytes) -> tuple[Any, ...] | None:
     return ReplyStatus(status), *fields
 
 
-def find_mask(body: bytes, fixed_xor: int) -> int | None:
-    """Find the smallest mask that keeps mask, masked body and checksum free of hazards.
-
-    `body` has an even length. `fixed_xor` is the XOR of the frame's other checksummed bytes (size and command).
-    None if there is no such mask, which cannot happen for bodies of up to 83 bytes.
-    """
-    unfit = {*HAZARDS}
-    checksum_without_mask = fixed_xor
-    for byte in body:
-        checksum_without_mask ^= byte
-    for hazard in HAZARDS:
-        unfit.update(apply_mask(body, hazard), (checksum_without_mask ^ hazard,))
-    return next(filterfalse(unfit.__contains__, range(256)), None)
-
-
-def apply_mask(body: bytes, mask: int) -> bytes:
-    """XOR every byte of `body` with `mask`. The same call removes the mask."""
-    return (int.from_bytes(body) ^ int.from_bytes(bytes((mask,)) * len(body))).to_bytes(len(body))
-
-
-def _masked_request(command: int, body: bytes) -> bytes | None:
-    """Encode a request with a masked body. Returns None if its frame would hold a hazard byte with every mask."""
-    size = len(body) + 1
-    mask = find_mask(body, size ^ command)
-    if mask is None:
-        return None
-    frame = request(command, bytes((mask,)) + apply_mask(body, mask))
-    return frame if is_clean(frame) else None
-
-
-def masked_request(command: int, body: bytes) -> bytes:
-    """Encode a request with a masked body of up to 83 bytes."""
-    frame = _masked_request(command, body)
-    if frame is None:
-        raise AssertionError(f"a {len(body)} byte body always has a mask")
-    return frame
-
-
 def encode_begin(identity: ListIdentity) -> bytes:
     """Encode BEGIN for a list. An empty one clears the stored list."""
     return masked_request(MissionCommand.BEGIN, _LIST.pack(identity.count, identity.checksum))
@@ -251,7 +211,7 @@ def encode_chunk(packed: bytes, first: int, most: int) -> Chunk:
     """Encode the largest clean CHUNK of at most `most` of the `packed` records (15 fit a frame) from `first` on."""
     for count in range(min(most, MAX_CHUNK_RECORDS, len(packed) // RECORD_SIZE - first), 0, -1):
         body = first.to_bytes(2, "little") + packed[first * RECORD_SIZE : (first + count) * RECORD_SIZE]
-        frame = _masked_request(MissionCommand.CHUNK, body)
+        frame = clean_masked_request(MissionCommand.CHUNK, body)
         if frame is not None:
             return Chunk(first, count, frame)
     raise AssertionError("a chunk of one record always has a mask")

@@ -7,7 +7,8 @@ from enum import IntEnum
 from typing import NamedTuple
 from zlib import crc32
 
-from protocols.msp.mission import ReplyStatus, masked_request
+from protocols.msp.frame import masked_request
+from protocols.msp.mission import ReplyStatus
 
 #: The index that means all settings: their checksum, or a save.
 WHOLE_TABLE = 0xFFFF

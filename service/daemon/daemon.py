@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running bridge: the links, the store and the clock, on one event loop."""
+"""The running bridge: the links to ground stations, the store and the clock, on one event loop."""
 
 import asyncio
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,7 @@ from bridge.config import BridgeConfig
 from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Datagrams
+from bridge.gcs.station import Datagrams, Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
 from bridge.missions.mission_service import DeliveryResult, MissionEnded
 from bridge.model.events import Armed, BridgeEvent, Disarmed, FcFound, FcInCommandLine, FcLost, PortLost
@@ -29,9 +29,9 @@ from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
-from service.daemon.gcs_connections import GcsConnections
 from service.daemon.last_settings import LastSettings
 from service.daemon.store_worker import StoreWorker
+from service.links.gcs_links import GcsLink, LinkError, open_link
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
@@ -39,7 +39,7 @@ from service.machine import event_loop
 from service.machine.host import Host
 from service.machine.log_setup import warn_once
 from service.machine.own_networks import OwnNetworks
-from service.machine.package import version
+from service.machine.package import page, version
 from service.machine.raspberry_pi import SYNCHRONIZED, clock_trouble, is_clock_set
 from service.recording.tlog_recorder import TLOG_FOLDER, TlogRecorder
 from service.settings import Settings
@@ -53,6 +53,7 @@ _STORE_TIMEOUT_S = 0.2
 _REST_INTERVAL_S = 0.02
 #: Frames are accepted over zenoh only if its transport is authenticated, or the owner waived that.
 _ZENOH = {"zenoh": LinkAccess(may_write=lambda _peer: True)}
+_WHO_MAY_WRITE = f"anyone on this network can change missions and parameters; to restrict it: {page('docs/signing.md')}"
 
 T = TypeVar("T")
 _log = structlog.get_logger()
@@ -73,6 +74,72 @@ class Follower:
     def status(self) -> Json:
         """The follower's part of `naze-bridge status`."""
         return {}
+
+
+class GcsConnections:
+    """Feeds the links' bytes to the bridge. Implements service.links.gcs_events.GcsEvents.
+
+    `flush` carries out the bridge's effects.
+    """
+
+    def __init__(self, bridge: Bridge, traffic: Mapping[str, Traffic], flush: Callable[[], None]) -> None:
+        self._bridge = bridge
+        self._traffic = traffic
+        self._flush = flush
+        self._loop = asyncio.get_running_loop()
+        #: The open links, by name.
+        self.links: dict[str, GcsLink] = {}
+        self.is_connected = bridge.is_connected
+        self.add_default_peer = bridge.add_default_peer
+        self.remove_default_peer = bridge.remove_default_peer
+
+    def open(self, address: GcsAddress) -> None:
+        """Open a link. Raises LinkError if that fails."""
+        self.add(open_link(address, self))
+
+    def warn(self, address: GcsAddress) -> None:
+        if not address.is_serial:
+            _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
+
+    def add(self, link: GcsLink) -> None:
+        self.links[link.name] = link
+
+    def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> tuple[GcsAddress, ...]:
+        """Replace links. Those that stay are not interrupted. Returns the open ones."""
+        for address in old:
+            if address not in new and (link := self.links.get(str(address))) is not None:
+                self._bridge.link_closed(link.name, self._loop.time())
+                self._flush()
+                del self.links[link.name]
+                link.close()
+                _log.info("gcs.closed", link=link.name)
+        for address in new:
+            if str(address) not in self.links:
+                try:
+                    self.open(address)
+                except LinkError as error:
+                    _log.error("gcs.unavailable", link=str(address), why=str(error))
+                else:
+                    self.warn(address)
+        return tuple(address for address in new if str(address) in self.links)
+
+    def close(self) -> None:
+        for link in self.links.values():
+            link.close()
+
+    def gcs_data(self, peer: Peer, data: bytes, *, datagram: bool) -> None:
+        self._traffic[peer.link].bytes_received += len(data)
+        try:
+            if not self._bridge.gcs_received(peer, data, self._loop.time(), datagram=datagram):
+                return
+        except Exception:
+            # A ground station must not be able to reset the flight controller's line: only the data is dropped.
+            _log.exception("gcs.fault", peer=str(peer))
+        self._flush()
+
+    def gcs_gone(self, peer: Peer) -> None:
+        self._bridge.gcs_gone(peer, self._loop.time())
+        self._flush()
 
 
 class Daemon:
@@ -192,7 +259,9 @@ class Daemon:
         for effect in self.bridge.take():
             match effect:
                 case Datagrams():
-                    self.gcs.send(effect)
+                    for peer, data in effect:
+                        self.gcs.links[peer.link].send(peer, data)
+                        self.traffic[peer.link].bytes_sent += len(data)
                 case SendToBoard():
                     self.fc.carry_out(effect)
                 case RecordFrames():

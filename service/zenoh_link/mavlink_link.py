@@ -8,7 +8,7 @@ import zenoh
 
 from bridge.gcs.station import Peer
 from payloads.keys import MAVLINK_OUT
-from service.daemon.gcs_connections import GcsConnections
+from service.daemon.daemon import GcsConnections
 from service.machine.threads import post
 from service.zenoh_link.publisher import Publisher
 

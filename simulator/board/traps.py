@@ -3,7 +3,7 @@
 
 from enum import Enum, auto
 
-from protocols.msp.command_line import HAZARDS, RUN_LENGTH
+from protocols.msp.frame import HAZARDS, RUN_LENGTH
 
 _CARRIAGE_RETURN, _NUMBER_SIGN, _LETTER_R = 0x0D, 0x23, 0x52
 

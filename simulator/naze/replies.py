@@ -5,7 +5,8 @@ import struct
 from typing import NamedTuple
 
 from protocols.mission_item import pack_records
-from protocols.msp.mission import Info, MissionCommand, Records, ReplyStatus, Staged, Stored, apply_mask, masked_request
+from protocols.msp.frame import apply_mask, masked_request
+from protocols.msp.mission import Info, MissionCommand, Records, ReplyStatus, Staged, Stored
 from protocols.msp.mission_flight import FlightProgress
 from protocols.msp.setting_table import WHOLE_TABLE, SettingsReply, TableReply
 

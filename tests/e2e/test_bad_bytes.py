@@ -12,9 +12,8 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from protocols.msp.command_line import is_clean
 from protocols.msp.commands import Msp
-from protocols.msp.frame import request
+from protocols.msp.frame import is_clean, request
 from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plain_station import PlainStation, udp_station

@@ -4,13 +4,12 @@
 from pathlib import Path
 
 import pytest
-from pymavlink.mavftp import MAVFTP
 
 from protocols.mission_item import Command
 from tests.support.benches import Bench
 from tests.support.mavproxy import MavProxy
 from tests.support.plan import HOME, PlanRow, expected_fields, judge, mixed_plan, plain_plan, records_of, waypoint
-from tests.support.programs import happens, until
+from tests.support.programs import happens
 
 
 @pytest.mark.parametrize("version", ["--mav10", "--mav20"])
@@ -42,13 +41,6 @@ def test_float_items_parameters_and_refusals_work(shared: Bench, tmp_path: Path)
         assert shared.board.records() == records_of(judge(plan, use_int=False))
         mavproxy.type("param show WPNAV_RADIUS")
         mavproxy.wait_for("200.0")
-        mavproxy.type("module load ftp")
-        file = tmp_path / "param.pck"
-        mavproxy.type(f"ftp get @PARAM/param.pck {file}")
-        mavproxy.wait_for("Wrote ")
-        # It says so before it closes the file.
-        packed = until(lambda: MAVFTP.ftp_param_decode(file.read_bytes()), "the whole file")
-        assert len(packed.params) == 237
         mavproxy.type("param set LED_ARMED 2")
         mavproxy.wait_for(": 0..1")
         # It finds only names in capitals, but takes them in any case.

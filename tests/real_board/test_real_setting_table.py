@@ -7,8 +7,8 @@ from zlib import crc32
 
 import pytest
 
-from protocols.msp.frame import Direction, request
-from protocols.msp.mission import ReplyStatus, masked_request
+from protocols.msp.frame import Direction, masked_request, request
+from protocols.msp.mission import ReplyStatus
 from protocols.msp.setting_table import (
     TABLE_REQUEST,
     HeldSetting,

@@ -23,16 +23,13 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from protocols.mavlink.dialect import Message
 from tests.support.walks import TracedDaemon, WakeUp, Walk, measure, run_traced
 
-#: Lower these whenever a walk has become shorter. Raised once, by a return each: to ask when all replies can be there
-#: saves a fifth of the wake-ups. That to the ack again, by ten calls: the list is judged as it is flown.
-#: That to the setting, by a return: the listener is given when the settings are made, and not assigned later.
-#: Then that to the ack by fifteen calls, and three walks by a file: the table of texts, for each kind of station.
+#: Lower these whenever a walk has become shorter.
 CEILINGS = {
-    "attitude": Walk(calls=40, returns=12, files=18),
-    "item": Walk(calls=57, returns=23, files=16),
-    "ack": Walk(calls=413, returns=213, files=43),
-    "setting": Walk(calls=263, returns=108, files=47),
-    "arming": Walk(calls=66, returns=18, files=26),
+    "attitude": Walk(calls=39, returns=12, files=16),
+    "item": Walk(calls=55, returns=23, files=14),
+    "ack": Walk(calls=395, returns=203, files=38),
+    "setting": Walk(calls=216, returns=90, files=30),
+    "arming": Walk(calls=64, returns=18, files=23),
 }
 #: A walk may be this much shorter than its ceiling.
 _SLACK = 0.05

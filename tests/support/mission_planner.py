@@ -8,7 +8,6 @@ sending MISSION_ITEM_INT, and its loops take each other's packets (`own_loss`).
 
 import random
 import socket
-import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -18,10 +17,8 @@ from typing import Any, Self
 
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as messages
-from pymavlink.mavftp import MAVFTP
 
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.ftp import FtpOp
 from protocols.mission_item import Frame, MissionResult
 from tests.support.mission_planner_screen import MissionPlannerScreen
 from tests.support.plan import PlanRow
@@ -29,7 +26,6 @@ from tests.support.programs import TIMEOUT_S
 
 SYSID, COMPID = 255, 190
 _DATAGRAM_SIZE = 2048
-_NAK, _READ_SIZE = 129, 110
 _INT_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 _FENCE_CAPABILITY = messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
 _TABS = ("MISSION", "FENCE", "RALLY")
@@ -84,7 +80,6 @@ class MissionPlanner:
         #: MAV_MISSION_TYPE of the tab that is open: its buttons write and read that list.
         self.tab = 0
         #: The parameters as a file; None: it requested them one by one.
-        self.file_of_parameters: bytes | None = None
         self.parameters: dict[str, float] = {}
         self._parameter_count = 0
         self.texts: list[str] = []
@@ -256,13 +251,9 @@ class MissionPlanner:
         self.command(m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 1)
         self.request_version()
         self.command(42428)
-        self.file_of_parameters = self._read_file(b"@PARAM/param.pck?withdefaults=1")
-        if self.file_of_parameters is None:
-            self._request_parameters()
-        else:
-            packed = MAVFTP.ftp_param_decode(self.file_of_parameters)
-            self.parameters |= {name.decode(): value for name, value, _ in packed.params}
-        assert self._read_file(b"@SYS/none.txt") is None
+        # With this capability it would ask for a file of parameters first, and wait 15 s for an answer.
+        assert not self.capabilities & m.MAV_PROTOCOL_CAPABILITY_FTP
+        self._request_parameters()
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 259, tries=4)
         self.command(521, 1)
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 269)
@@ -318,47 +309,6 @@ class MissionPlanner:
                 for message in self._packets(0.2):
                     if message.get_type() == "PARAM_VALUE":
                         break
-
-    def _read_file(self, path: bytes) -> bytes | None:
-        """Reset the sessions, open, and read in bursts of session 0; None without the capability or the file.
-
-        The next burst is requested when one is complete, or something of it is missing.
-        """
-        if not self.capabilities & messages.MAV_PROTOCOL_CAPABILITY_FTP:
-            return None
-        self._ask_file(FtpOp.RESET_SESSIONS)
-        opened = self._ask_file(FtpOp.OPEN_FILE_RO, path)
-        if opened[3] == _NAK:
-            return None
-        size = int.from_bytes(bytes(opened[12:16]), "little")
-        content = b""
-        while len(content) < size:
-            packet: list[int] | None = self._ask_file(FtpOp.BURST_READ_FILE, size=_READ_SIZE, offset=len(content))
-            while packet is not None:
-                content += bytes(packet[12 : 12 + packet[4]])
-                is_complete = packet[6]
-                packet = None if is_complete else self._file_packet(FtpOp.BURST_READ_FILE, len(content))
-        return content
-
-    def _ask_file(self, opcode: FtpOp, data: bytes = b"", size: int = 0, offset: int = 0) -> list[int]:
-        """The payload of the reply, 2 s a try; of a burst the one with this offset."""
-        header = struct.pack("<HBBBBBBI", 1, 0, opcode, size or len(data), 0, 0, 0, offset)
-        payload = list((header + data).ljust(251, b"\0"))
-        for _ in range(5):
-            self.send(messages.MAVLink_file_transfer_protocol_message(0, *self._target, payload))
-            if (found := self._file_packet(opcode, offset)) is not None:
-                return found
-        raise TimedOut("no answer to a file request")
-
-    def _file_packet(self, opcode: FtpOp, offset: int) -> list[int] | None:
-        """Wait for an answer, 2 s."""
-        for message in self._packets(2.0):
-            if message.get_type() != "FILE_TRANSFER_PROTOCOL" or message.payload[5] != opcode:
-                continue
-            if int.from_bytes(bytes(message.payload[8:12]), "little") == offset:
-                found: list[int] = message.payload
-                return found
-        return None
 
     # -- writing ---------------------------------------------------------------------------------------------
 

@@ -40,8 +40,7 @@ from bridge.sharing.program import Program
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_item import ListIdentity, identify
-from protocols.msp.command_line import is_clean
-from protocols.msp.frame import MspFrame, MspParser
+from protocols.msp.frame import MspFrame, MspParser, is_clean
 from protocols.msp.mission import WpRecord, unpack_records
 from protocols.msp.nav import SET_WP_INDEX
 from protocols.rights import Effect

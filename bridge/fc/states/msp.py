@@ -69,10 +69,10 @@ class MspLine(State):
         return self.link.unanswered()
 
     def _take(self, frame: MspFrame, now: float) -> None:
-        """Replies belong to a conversation, to a poll, or to both."""
+        """A reply belongs to the conversation that waits for it, else to a poll."""
         if frame.command in self.port.runner.awaited_replies:
             self.port.runner.advance(frame, now)
-        if self.controller is not None and frame.command in self.port.polls.commands:
+        elif self.controller is not None and frame.command in self.port.polls.commands:
             self.port.polls.answered(frame)
             hear_msp(self.port.vehicle, frame, self.controller, now)
 

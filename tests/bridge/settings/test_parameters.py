@@ -380,7 +380,7 @@ def test_a_change_is_answered_once(has_listed: bool) -> None:
 def test_a_station_that_uses_other_letters_is_answered_with_them() -> None:
     """MAVSDK waits for the name that it has sent."""
     world, station = settled_world()
-    assert [each.param_id for each in reply_to(world, station, b"p_roll", 44.0)] == ["P_ROLL", "p_roll"]
+    assert [each.param_id for each in reply_to(world, station, b"p_roll", 44.0)] == ["p_roll", "P_ROLL"]
     _, error, value = reply_to(world, station, b"p_roll", 201.0)
     assert (error.get_type(), error.param_id, value.param_id) == ("PARAM_ERROR", "p_roll", "p_roll")
     received = answers((world, station), m.MAVLink_param_request_read_message(1, 1, b"p_roll", -1))

@@ -209,7 +209,7 @@ def test_a_command_for_another_system_is_not_answered(flying: tuple[World, Groun
         assert len(acks(answers(flying, long(512, 148, system=system, component=component)))) == 1
 
 
-def test_autopilot_version_has_the_ftp_capability(flying: tuple[World, GroundStation]) -> None:
+def test_autopilot_version_has_no_ftp_capability(flying: tuple[World, GroundStation]) -> None:
     version, _home = answers(flying, m.MAVLink_autopilot_version_request_message(1, 1))
     assert version.get_type() == "AUTOPILOT_VERSION"
     assert version.flight_sw_version == 0x020101FF  # 2.1.1, official
@@ -217,7 +217,8 @@ def test_autopilot_version_has_the_ftp_capability(flying: tuple[World, GroundSta
     assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     assert can & m.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
     assert can & m.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    assert can & m.MAV_PROTOCOL_CAPABILITY_FTP
+    # Mission Planner would ask for a file of parameters first, and wait.
+    assert not can & m.MAV_PROTOCOL_CAPABILITY_FTP
 
 
 def test_requesting_an_unknown_home_is_temporarily_rejected() -> None:

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink 1 for receivers that support only it (fixed payload sizes, no extension fields), and packing by struct."""
 
-import struct
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.mavlink.codec import FrameWriter, decode, pack, pack_attitude, pack_component_metadata
+from protocols.mavlink.codec import FrameWriter, decode, file_refusal, pack, pack_attitude
 from protocols.mavlink.dialect import Message, messages
 from protocols.mavlink.frame import MavlinkSplitter
 
@@ -64,9 +62,10 @@ def test_attitude_is_packed_like_pymavlinks(version: int, boot_ms: int, values: 
     assert frame == theirs.pack(m.MAVLink(None, srcSystem=1, srcComponent=1), force_mavlink1=version == 1)
 
 
-def test_component_metadata_has_the_layout_of_common_xml() -> None:
-    """pymavlink lacks it: https://mavlink.io/en/messages/common.html#COMPONENT_METADATA."""
-    raw = FrameWriter(1, 1).frame(pack_component_metadata(12, 34, "mftp://general.json"), 1)
-    (frame,) = MavlinkSplitter().feed(raw)
-    assert (frame.version, frame.msgid) == (2, 397)
-    assert frame.payload == struct.pack("<II", 12, 34) + b"mftp://general.json"
+@pytest.mark.parametrize(("opcode", "kind", "error"), [(2, 128, 0), (4, 129, 10), (15, 129, 10), (6, 129, 2)])
+def test_a_file_is_not_found_and_none_is_written(opcode: int, kind: int, error: int) -> None:
+    """RESET_SESSIONS, OPEN_FILE_RO, BURST_READ_FILE and CREATE_FILE (https://mavlink.io/en/services/ftp.html)."""
+    reply = file_refusal([7, 0, 3, opcode, *[0] * 247])
+    assert reply is not None
+    assert (reply[:3], reply[3], reply[5], reply[12]) == ([8, 0, 3], kind, opcode, error)
+    assert file_refusal(reply) is None

@@ -4,8 +4,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.command_line import EchoWatch, is_clean, typed_and_rubbed_out
-from protocols.msp.frame import request
+from protocols.msp.command_line import EchoWatch, typed_and_rubbed_out
+from protocols.msp.frame import is_clean, request
 
 #: Three of one of these in a row open a Harakiri's command line, or reset it.
 HAZARDS = (0x0D, 0x23, 0x52)

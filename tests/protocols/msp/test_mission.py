@@ -7,19 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocols.mission_item import ListIdentity, pack_records
-from protocols.msp.frame import MspFrame, MspParser
+from protocols.msp.frame import MspFrame, MspParser, apply_mask, find_mask
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
     RECORD_SIZE,
     MissionCommand,
     WpRecord,
-    apply_mask,
     encode_begin,
     encode_chunk,
     encode_commit,
     encode_read,
-    find_mask,
     unpack_records,
 )
 from simulator.board.msp_port import MspReceiver

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.msp.command_line import is_clean
+from protocols.msp.frame import is_clean
 from protocols.msp.mission import ReplyStatus
 from protocols.msp.setting_table import (
     HeldSetting,

@@ -8,7 +8,7 @@ import zenoh
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from protocols.mavlink.frame import MavlinkSplitter
-from service.daemon.gcs_connections import GcsConnections
+from service.daemon.daemon import GcsConnections
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
 from tests.support.benches import Starter

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.mission_item import ListIdentity, identify, pack_records
-from protocols.msp.frame import request
+from protocols.msp.frame import apply_mask, request
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
@@ -20,7 +20,6 @@ from protocols.msp.mission import (
     Staged,
     Stored,
     WpRecord,
-    apply_mask,
     decode_info,
     decode_records,
     encode_begin,

@@ -12,7 +12,8 @@ import pytest
 
 from bridge.fc.states.searching import SPEEDS
 from bridge.line.msp_link import PROBE, RESYNC
-from protocols.msp.command_line import HAZARDS, RUB_OUT_LINE, is_clean, typed_and_rubbed_out
+from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
+from protocols.msp.frame import HAZARDS, is_clean
 from simulator.board.line import garble
 from simulator.board.options import SimOptions
 from simulator.board.traps import HazardWatch

@@ -17,8 +17,8 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
+from service.daemon.fc_connection import FcPort
 from service.links.fc_device import device_opener, open_serial
-from service.links.fc_port import FcPort
 from service.links.traffic import Traffic
 from service.machine.event_loop import running
 from service.settings.addresses import SerialFc
@@ -375,7 +375,7 @@ async def test_a_port_that_does_not_take_a_speed_counts_as_lost(
 
 async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """A TCP adapter that is in use accepts a connection and closes it at once."""
-    monkeypatch.setattr("service.links.fc_port._RETRY_S", 3600)
+    monkeypatch.setattr("service.daemon.fc_connection._RETRY_S", 3600)
     opened = 0
     lost: list[str] = []
 
@@ -398,8 +398,8 @@ async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch)
 
 async def test_a_port_in_use_is_tried_less_often(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each try searches all processes for the program that uses it."""
-    monkeypatch.setattr("service.links.fc_port._RETRY_S", 0)
-    monkeypatch.setattr("service.links.fc_port._IN_USE_RETRY_S", 3600)
+    monkeypatch.setattr("service.daemon.fc_connection._RETRY_S", 0)
+    monkeypatch.setattr("service.daemon.fc_connection._IN_USE_RETRY_S", 3600)
     tried = 0
 
     async def open_device() -> serial.Serial:
