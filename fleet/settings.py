@@ -44,7 +44,7 @@ class HeldSettings:
 
 @dataclass(frozen=True, slots=True)
 class SettingVariant:
-    """A value of a setting, and the vehicles that have it. None: they lack it."""
+    """A value of a setting, and the vehicles that have it. None if they lack it."""
 
     value: float | str | None
     vehicles: tuple[str, ...]

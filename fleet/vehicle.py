@@ -24,7 +24,7 @@ class BridgeId:
 
 @dataclass(frozen=True, slots=True)
 class FleetVehicle:
-    """The known data of one vehicle; None: unknown.
+    """The known data of one vehicle; None if unknown.
 
     `answers`: True if it was heard. `bridges`: how many use this name, normally 1.
     """

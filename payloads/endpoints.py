@@ -56,7 +56,7 @@ def read_zenoh_file(path: Path) -> zenoh.Config:
 
 @dataclass(frozen=True, slots=True)
 class TlsFiles:
-    """PEM files as zenoh's `transport/link/tls` names them; None: not given."""
+    """PEM files as zenoh's `transport/link/tls` names them; None if not given."""
 
     root_ca_certificate: Path | None = None
     connect_certificate: Path | None = None

@@ -17,7 +17,7 @@ _PROGRESS = {progress.text: progress.value for progress in Progress}
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """Made from the state. None: not known, or stale."""
+    """Made from the state. None if not known, or stale."""
 
     link: Annotated[str, "as in link's state"]
     armed: bool | None

@@ -14,7 +14,7 @@ _MOST = 3e38
 
 @dataclass(frozen=True, slots=True)
 class SettingRow:
-    """A setting that differs. None: that side does not have it."""
+    """A setting that differs. None if that side does not have it."""
 
     name: str
     left: float | str | None

@@ -71,7 +71,7 @@ def synchronise(within_s: float, is_waiting: Callable[[], None] = lambda: None) 
 
 
 def end_command() -> Dialogue[bool]:
-    """Send fillers until a NACK: then no command is half sent. False: there is none."""
+    """Send fillers until a NACK: then no command is half sent. False if there is none."""
     for _ in range(_FILLERS):
         if NACK in (yield _bytes(_FILLER, 1, _FILLER_S)):
             return True

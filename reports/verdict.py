@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 from protocols.mission_item import MissionItem, MissionRecord, MissionResult
 from reports.finding import Finding, RejectingFinding
 
-#: Item numbers of a list as sent, by the item numbers as read back; None: not sent.
+#: Item numbers of a list as sent, by the item numbers as read back; None if not sent.
 SentSeqs = tuple[int | None, ...]
 RecordT = TypeVar("RecordT", bound=MissionRecord)
 

@@ -122,7 +122,7 @@ def _repeated(command: Callable[[], Dialogue[T]]) -> Dialogue[T]:
 
 
 def _attempt(command: Dialogue[T]) -> Dialogue[T | None]:
-    """Carry out a command. None: it failed, and the next can be sent. FlashingError."""
+    """Carry out a command. None if it failed, and the next can be sent. FlashingError."""
     try:
         return (yield from command)
     except BootLoaderError:

@@ -35,7 +35,7 @@ class Loading(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StoreReport:
-    """The flight controller's report on the mission store. `stored` None: not known without reading the list."""
+    """The flight controller's report on the mission store. `stored` None if not known without reading the list."""
 
     state: StoreState
     rules: MissionRules

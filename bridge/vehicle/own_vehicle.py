@@ -183,7 +183,7 @@ class OwnVehicle:
     # Requests of ground stations.
 
     def send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> bool | None:
-        """Send one message to a ground station. Returns False if the values are unknown, None: no such message.
+        """Send one message to a ground station. Returns False if the values are unknown, None if it does not exist.
 
         `index`: of the flight mode in AVAILABLE_MODES, from 1, or 0 if all.
         """

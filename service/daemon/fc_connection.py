@@ -276,7 +276,7 @@ class FcConnection:
         # While replies to polls are gathered.
         self._is_held = False
         self._search_report: asyncio.TimerHandle | None = None
-        #: On the loop's clock; `found_at` None: no flight controller; `lost_at` None: none was lost since.
+        #: On the loop's clock; `found_at` None without a flight controller; `lost_at` None: none was lost since.
         self.found_at: float | None = None
         self.lost_at: float | None = None
 

@@ -53,7 +53,7 @@ class SettingsApi:
         return await self.backup(whole_number(request, "number", 0, MOST))
 
     async def table(self) -> Json:
-        """All settings. is_checked False: the flight controller could not be asked, they are as last read."""
+        """All settings. is_checked False if the flight controller could not be asked, they are as last read."""
         table = await self._answer(self._daemon.bridge.settings.read)
         return {
             "board": self._daemon.bridge.settings.kind or "",

@@ -51,7 +51,7 @@ class Settings(BridgeSettings):
     """The settings of a daemon. Without `state_dir` it does not store anything.
 
     `access`: write permission per link, by its address as text. Links not in it are open. `sources`: where each given
-    key was found ("FILE:LINE", or a flag). `zenoh` None: not used. `web` None: no status page.
+    key was found ("FILE:LINE", or a flag). `zenoh` None if not used. `web` None without a status page.
     """
 
     fc: Annotated[

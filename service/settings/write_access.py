@@ -27,7 +27,7 @@ _MAX_PASSPHRASE = 4096
 
 @dataclass(frozen=True, slots=True)
 class WriteAccess:
-    """`key` None: no signature needed. `writers` None: any address may write, or none if it is empty.
+    """`key` None if signatures are not required. `writers` None: any address may write, or none if it is empty.
 
     `weak_key`: a sentence if the key can be guessed.
     """

@@ -33,7 +33,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
     def __init__(self, controller: FlightController) -> None:
         assert controller.arm_bit is not None
         self._arm_bit = controller.arm_bit
-        #: As last read; None: unknown.
+        #: As last read; None if unknown.
         self._known: tuple[RecordT, ...] | None = None
         #: True if the board's RAM may differ from the flash.
         self._is_unsaved = False

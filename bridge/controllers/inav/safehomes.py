@@ -36,7 +36,7 @@ _NOT_MOVED_M = 1.0
 
 
 def read_approaches(numbers: Iterable[int]) -> Conversation[tuple[FwApproach, ...] | None]:
-    """Those of these numbers, or none from a version before 7.1. None: no answer, or one about others."""
+    """Those of these numbers, or none from a version before 7.1. None without an answer, or one about others."""
     found: list[FwApproach] = []
     for number in numbers:
         reply = yield from ask(encode_read_approach(number), FW_APPROACH, APPROACH_SIZE)

@@ -114,7 +114,7 @@ class InavFcSettings(FcSettings):
 
 
 def read_values(names: Iterable[str]) -> Conversation[dict[str, Value] | None]:
-    """The values of these settings. Those that this version lacks are missing. None: it does not answer."""
+    """The values of these settings. Those that this version lacks are missing. None if it does not answer."""
     values: dict[str, Value] = {}
     for name in names:
         reply = yield from _ask(encode_about_name(name))

@@ -27,7 +27,7 @@ class NavProfile:
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and no other may be in its loop. If False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands, else the last record's p1 does. limits: its own settings; None: unknown.
+    decides if it lands, else the last record's p1 does. limits: its own settings; None if unknown.
     """
 
     capacity: int = INAV_CAPACITY

@@ -35,7 +35,7 @@ _KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _LABELS
 
 
 def page_settings(host: Host) -> list[Json]:
-    """Each setting: label, choices, the value in force (None: the default), and the other file that decides it."""
+    """Each setting: label, choices, the value in force (None if the default), and the other file that decides it."""
     given = _given(host)
     return [_page_setting(key, *given.get(key.name, (None, _FILE))) for key in _KEYS.values()]
 
