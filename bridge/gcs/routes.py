@@ -58,7 +58,7 @@ class Routes:
     def from_station(self, station: GroundStation, frame: MavlinkFrame, *, to_stations: bool) -> bool:
         """Send an accepted frame on to other stations. Returns True if it is also for the autopilot.
 
-        `to_stations`: False if it does not reach other station.
+        `to_stations`: False if it does not reach any other station.
         """
         system, component = frame.target
         there = self._ground.everyone if system == 0 else self._stations_of(system, component)

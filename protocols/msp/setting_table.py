@@ -53,7 +53,7 @@ class Setting(NamedTuple):
 
     @property
     def identity(self) -> int:
-        """The hash that a request to set it must have, so that it does not reach other build's setting."""
+        """The hash that a request to set it must have, so that it does not reach another build's setting."""
         return crc32(self.description)
 
     def pack(self, value: float) -> bytes:
