@@ -54,7 +54,6 @@ from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
-_EMPTY_PLAN = Refusal(MissionResult.DENIED, sentences.EMPTY_PLAN())
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
@@ -105,10 +104,9 @@ class MissionUploads:
             if not count and self.answers.repeat_cancelled(sender, now):
                 return
             is_qgc = sender.station.behaviour.kind is Kind.QGROUNDCONTROL
-            if not count and is_qgc and self.answers.are_only_missions_stored and self._missions.on_board:
-                # It erases a mission by MISSION_CLEAR_ALL, and writes a plan that has only a fence as an empty mission.
-                sender.refuse(_EMPTY_PLAN)
-                return
+            if not count and is_qgc and self.answers.are_only_missions_stored:
+                # Its button Clear sends MISSION_CLEAR_ALL. This is a plan without waypoints, perhaps with a fence.
+                sender.say(sentences.EMPTY_PLAN())
             self._begin(sender, count, now)
             return
         upload.heard_at, state = now, upload.state

@@ -193,7 +193,7 @@ PLACES_STORED_WITH_LOSSES = Sentence(
 )
 PLACES_CLEARED = Sentence(_INFO, "{} cleared{}", "Rally points", ", unchanged")
 PART_OF_LAST = Sentence(_INFO, "The whole mission before: see Missions on the page, or missions restore")
-EMPTY_PLAN = Sentence(_ERROR, "Fences are not stored here; Clear erases a mission")
+EMPTY_PLAN = Sentence(_WARNING, "Plan without waypoints: fences are not stored here")
 NO_LIST = Sentence(_INFO, "No mission to read: {}", _REASON)
 NOT_STORED_ON_PI = Sentence(_WARNING, "The mission could not be stored on the Pi")
 NEW_MISSION = Sentence(_INFO, "New mission, {} items, by {}", _ITEMS, _STATION)
