@@ -11,6 +11,8 @@ from protocols.mission_item import Command, MissionItem, MissionResult
 DROPPED = "dropped"
 REJECTED = "rejected"
 CLEARED = "cleared"
+#: The beginning of a danger because of which the board refuses the flight.
+NOT_FLOWN = "not flown"
 _OF_THE_LIST: Mapping[object, str] = {REJECTED: "Mission rejected: ", CLEARED: "Mission erased: "}
 
 _LABELS = {"lat_e7": "Lat", "lon_e7": "Long", "alt_m": "Alt"}

@@ -99,14 +99,20 @@ class FlownPath:
         self._lands = lands
         self._has_loops = has_loops
         self.length_m, self.highest_cm = 0.0, 0
+        self._has_unknown_height = False
         for leg in legs:
             self.length_m += leg.length_m
-            if not leg.is_return and leg.end_cm is not None and leg.end_cm > self.highest_cm:
+            if leg.is_return:
+                continue
+            if leg.end_cm is None:
+                self._has_unknown_height = True
+            elif leg.end_cm > self.highest_cm:
                 self.highest_cm = leg.end_cm
 
     def facts(self) -> tuple[str, ...]:
         """The flight in words, for one sentence."""
-        words = [in_metres(self.length_m) + " a round" * self._has_loops, f"highest {self.highest_cm / 100:g} m"]
+        words = [in_metres(self.length_m) + " a round" * self._has_loops]
+        words += [] if self._has_unknown_height else [f"highest {self.highest_cm / 100:g} m"]
         for leg in self.legs:
             if leg.is_return:
                 words.append("returns home" if leg.end_cm is None else f"returns home at {leg.end_cm / 100:g} m")

@@ -9,7 +9,7 @@ from typing import Any
 from bridge.voice import sentences
 from bridge.voice.happening import LINE_LENGTH, Happening
 from protocols.mission_item import Command
-from reports.finding import DROPPED, Finding, News, without_defaults
+from reports.finding import DROPPED, NOT_FLOWN, Finding, News, without_defaults
 from reports.verdict import Verdict
 
 _MOST_LINES = 10
@@ -53,9 +53,10 @@ def summary(sent: int, verdict: Verdict[Any], *, is_unchanged: bool = False) -> 
         "LAND flown to first": landings,
         "flown differently": len(kept) - relative - raised - home,
     }
-    dangers = sum(finding.news is News.DANGER for finding in warnings)
-    news = [f"{dangers} danger{'s' * (dangers > 1)}"] * (dangers > 0)
-    news += [f"{count} {what}" for what, count in counts.items() if count] + ["check home"] * (home > 0)
+    dangers = [finding for finding in warnings if finding.news is News.DANGER]
+    is_refused = any(finding.why.startswith(NOT_FLOWN) for finding in dangers)
+    news = ["will not fly"] if is_refused else [f"{len(dangers)} danger{'s' * (len(dangers) > 1)}"] * bool(dangers)
+    news += ["check home"] * (home > 0) + [f"{count} {what}" for what, count in counts.items() if count]
     return _fitted(start, news, verdict.flight)
 
 

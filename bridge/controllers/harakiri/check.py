@@ -47,7 +47,7 @@ from bridge.model.ground_track import Place, distance_m
 from protocols.mavlink.dialect import command_name
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.mission import WpCommand, WpRecord
-from reports.finding import CLEARED, DROPPED, Finding, News, RejectingFinding, reject
+from reports.finding import CLEARED, DROPPED, NOT_FLOWN, Finding, News, RejectingFinding, reject
 from reports.verdict import Result, Verdict
 
 #: NF_MAX_LEG_M, and NF_TAKEOFF_LEAST_M, also of legs, and NF_TAKEOFF_MOST_M.
@@ -76,20 +76,20 @@ class FlightLimits:
         for leg in path.legs:
             off_m = 0.0 if home is None else distance_m(home, leg.end)
             if 0 < self.mission_radius < int(off_m):
-                why = f"not flown: {in_metres(off_m)} off, mission_radius {self.mission_radius} m"
+                why = f"{NOT_FLOWN}: {in_metres(off_m)} off, mission_radius {self.mission_radius} m"
                 outside.append((leg.target, why))
             elif leg.is_first and int(leg.length_m) > self.mission_first:
-                why = f"not flown: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
+                why = f"{NOT_FLOWN}: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
                 if departure.home is not None and int(distance_m(departure.home, leg.end)) <= self.mission_first:
                     why = f"starts only at the list's home, {in_metres(leg.length_m)} off"
                 yield Judgement(leg.target, "lat_e7", why)
             elif int(leg.length_m) > MAX_LEG_M:
-                long.append((leg.target, f"not flown: {in_metres(leg.length_m)} leg, at most 2 km"))
+                long.append((leg.target, f"{NOT_FLOWN}: {in_metres(leg.length_m)} leg, at most 2 km"))
         for place, record in enumerate(records):
             if not place or record.command in _WITHOUT_HEIGHT:
                 continue
             if (flown_m := _flown_m(record)) > self.mission_height:
-                high.append((place, f"not flown: {flown_m} m, mission_height {self.mission_height}"))
+                high.append((place, f"{NOT_FLOWN}: {flown_m} m, mission_height {self.mission_height}"))
             elif flown_m != record.height_m:
                 limited.append((place, f"{record.height_m} m is flown at {flown_m} m"))
         yield from first_of(limited, "alt_m", News.WARNING)
@@ -320,9 +320,8 @@ class HarakiriCheck(ListCheck):
     def _raise_return(self, item: MissionItem) -> int:
         """QGroundControl's Return item has no altitude at all."""
         lowest_m = CRUISE.instead_of_zero
-        self._note(
-            item, "alt_m", given(item.alt_m), lowest_m, f"RTL flies home at {lowest_m} m, set its Alt", News.DANGER
-        )
+        why = f"RTL home at {lowest_m} m: set Alt, or a WP at home"
+        self._note(item, "alt_m", given(item.alt_m), lowest_m, why, News.DANGER)
         self._raised_returns.add(len(self._records))
         return lowest_m
 

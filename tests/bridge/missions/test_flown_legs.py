@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A way in words, and plain limits on it."""
 
+from dataclasses import replace
+
 import pytest
 
 from bridge.controllers.nav.flown_path import fly
@@ -30,6 +32,7 @@ RTH, AGAIN = NavRecord(NavAction.RTH), NavRecord(NavAction.JUMP, p1=1, p2=3)
         (way(leg(1), leg(3), RTH), "600 m, highest 20 m, returns home, does not land"),
         (way(leg(1), leg(3), RTH, lands=True), "600 m, highest 20 m, returns home, lands"),
         (way(leg(1), leg(3), leg(2), AGAIN, leg(4)), "700 m a round, highest 20 m, does not land"),
+        (way(leg(1), replace(leg(2), p3=1)), "200 m, does not land"),
         (FlownPath(), "0 m, highest 0 m, does not land"),
     ],
 )

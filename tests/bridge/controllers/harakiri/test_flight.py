@@ -131,7 +131,7 @@ def test_a_board_that_does_not_fly_missions_has_plain_limits() -> None:
 @pytest.mark.parametrize(
     ("rtl_m", "told"),
     [
-        (0.0, ["WP 2: RTL flies home at 2 m, set its Alt"]),
+        (0.0, ["WP 2: RTL home at 2 m: set Alt, or a WP at home"]),
         (5.0, ["WP 2: RTL flies home at 5 m, below the 20 m"]),
         (20.0, []),
     ],

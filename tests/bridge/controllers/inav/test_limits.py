@@ -132,6 +132,11 @@ def test_a_return_home_that_differs_from_the_list_is_named(
 
 def test_another_selected_mission_is_named() -> None:
     assert texts(WP, selected=2) == ["Stored as mission 1, mission 2 was selected"]
+    first = "Stored as mission 1, mission 2 was selected"
+    aeroplane: dict[str, Any] = {"platform": Platform.AEROPLANE, "selected": 2}
+    renumbered = f"{first}: each mission lands by the FW approach of its new number"
+    assert texts(NEAR, approach=APPROACH, **aeroplane) == [renumbered]
+    assert texts(NEAR, **aeroplane) == [first]
 
 
 @pytest.mark.parametrize(
