@@ -7,7 +7,7 @@ check_record).
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from bridge.controllers.harakiri.rules import (
@@ -64,7 +64,7 @@ class FlightLimits:
     mission_height: int = 100
     #: 0: any distance from home.
     mission_radius: int = 0
-    is_assumed: bool = False
+    is_assumed: bool = field(default=False, kw_only=True)
 
     def assumed(self) -> tuple[str, ...]:
         return "mission flight", f"mission_first = {self.mission_first}", f"mission_height = {self.mission_height}"
@@ -125,14 +125,6 @@ def fly(records: Sequence[WpRecord], departure: Departure) -> FlownPath:
         legs.append(Leg(place, place, start, end, length_m, start_cm, end_cm, not legs, is_return))
         here, here_cm = end, end_cm
     return FlownPath(legs, lands=records[-1].command == WpCommand.LAND)
-
-
-def low_returns(path: FlownPath) -> Iterable[Judgement]:
-    """Returns below the highest leg."""
-    for leg in path.legs:
-        if leg.is_return and leg.end_cm is not None and leg.end_cm < path.highest_cm:
-            why = f"RTL flies home at {leg.end_cm / 100:g} m, below the {path.highest_cm / 100:g} m"
-            yield Judgement(leg.target, "alt_m", why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,6 +349,7 @@ class HarakiriCheck(ListCheck):
             yield from beyond_plain_limits(path, departure)
         else:
             yield from self._flight.judge(self._records, path, departure)
-        for low in low_returns(path):
-            if low.place not in self._raised_returns:
-                yield low
+        for leg in path.legs:
+            if leg.is_return and leg.target not in self._raised_returns and (leg.end_cm or 0) < path.highest_cm:
+                why = f"RTL flies home at {(leg.end_cm or 0) / 100:g} m, below the {path.highest_cm / 100:g} m"
+                yield Judgement(leg.target, "alt_m", why)

@@ -114,10 +114,7 @@ class HarakiriMissions(_HarakiriStore):
         if self._vehicle.last_flight is None:
             return None
         values = yield from read_by_name(self._places, "mission_first", "mission_height", "mission_radius")
-        if values is None:
-            return USUAL_FLIGHT
-        first_m, height_m, radius_m = map(int, values)
-        return FlightLimits(first_m, height_m, radius_m)
+        return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))
 
     def push(self, records: tuple[WpRecord, ...], progress: PushProgress) -> Conversation[PushResult]:
         """Write the list: BEGIN, CHUNKs, COMMIT. Verified by the checksum over the flash."""
