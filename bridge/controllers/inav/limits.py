@@ -197,12 +197,10 @@ class InavLimits:
         yield from judge_zones(self.zones, path, departure)
         yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
         if self.selected > 1:
-            why = f"Stored as mission 1, mission {self.selected} was selected"
-            if self.platform is Platform.AEROPLANE and self.approach is not None:
-                lands = f"{why}: each mission lands by the FW approach of its new number"
-                yield Judgement(None, "", lands, News.WARNING)
-            else:
-                yield Judgement(None, "", why, News.NOTICE)
+            has_approaches = self.platform is Platform.AEROPLANE and self.approach is not None
+            lands = ": each mission lands by the FW approach of its new number" * has_approaches
+            why = f"Stored as mission 1, mission {self.selected} was selected{lands}"
+            yield Judgement(None, "", why, News.WARNING if has_approaches else News.NOTICE)
 
     def _first(self, first: NavRecord, departure: Departure) -> Iterable[Judgement]:
         """INAV measures the distance to the first record, whatever the action, from where it is armed."""
