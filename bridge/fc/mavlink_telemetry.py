@@ -55,7 +55,6 @@ class MavlinkReadings:
             m.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
             m.MAVLINK_MSG_ID_HOME_POSITION: lambda message, _: vehicle.hear_home(message.latitude, message.longitude),
-            m.MAVLINK_MSG_ID_SCALED_PRESSURE: self._scaled_pressure,
             m.MAVLINK_MSG_ID_RC_CHANNELS: self.rc_channels,
             m.MAVLINK_MSG_ID_RC_CHANNELS_RAW: self.rc_channels,
             m.MAVLINK_MSG_ID_SYSTEM_TIME: lambda message, now: vehicle.hear_gps_time(
@@ -120,9 +119,6 @@ class MavlinkReadings:
         # SYS_STATUS has the voltage of the first battery.
         if message.id == 0 and message.current_consumed >= 0:
             self.vehicle.hear(v.Charge(now, v.Source.MAVLINK, message.current_consumed))
-
-    def _scaled_pressure(self, message: Message, now: float) -> None:
-        self.vehicle.hear(v.Pressure(now, v.Source.MAVLINK, message.press_abs, message.temperature / 100))
 
     def rc_channels(self, message: Message, now: float) -> None:
         if getattr(message, "port", 0):

@@ -33,29 +33,18 @@ class MessageRates:
         self.used_until = -inf
 
     def request(self, msgid: int, interval_s: float | None) -> None:
-        """Set the interval that the station requests. Returns None if the default."""
+        """Set the interval that the station requests, or None for the default."""
         self.due.pop(msgid, None)
         if interval_s is None:
             self.requested.pop(msgid, None)
         else:
             self.requested[msgid] = interval_s
 
-    def interval_s(self, msgid: int, default_s: float) -> float:
-        return self.requested.get(msgid, default_s)
-
-    @property
-    def is_default(self) -> bool:
-        return not self.requested
-
 
 def fastest_s(stations: Sequence["GroundStation"], defaults_s: Mapping[int, float]) -> Mapping[int, float]:
     """The shortest interval for each message."""
-    special = [station.rates for station in stations if not station.rates.is_default]
-    if stations and not special:
-        return defaults_s
-    others = [MessageRates()] if len(special) < len(stations) else []
     return {
-        msgid: min((rates.interval_s(msgid, default_s) for rates in special + others), default=inf)
+        msgid: min((station.rates.requested.get(msgid, default_s) for station in stations), default=inf)
         for msgid, default_s in defaults_s.items()
     }
 

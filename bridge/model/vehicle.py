@@ -196,14 +196,6 @@ class Motors(Reading):
 
 
 @dataclass(slots=True)
-class Pressure(Reading):
-    """The barometer."""
-
-    absolute_hpa: float
-    temperature_c: float
-
-
-@dataclass(slots=True)
 class ImuSample(Reading):
     """acc_mg: forward, right, down, 1/1000 g; at rest 0, 0, -1000. Gyro and compass: in the firmware's own units."""
 

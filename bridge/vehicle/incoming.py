@@ -117,10 +117,7 @@ class Incoming:
             **self._of_type[m.MAV_MISSION_TYPE_MISSION],
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda s, msg, now: commands.set_current(s, msg.seq, now),
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
-                s,
-                msg.command,
-                (msg.param1, msg.param2, msg.param3, msg.param4, msg.param5, msg.param6, msg.param7),
-                now,
+                s, msg.command, [getattr(msg, f"param{number}") for number in range(1, 8)], now
             ),
             m.MAVLINK_MSG_ID_COMMAND_INT: lambda s, msg, now: commands.take(
                 s, msg.command, (msg.param1, msg.param2, msg.param3, msg.param4, msg.x, msg.y, msg.z), now

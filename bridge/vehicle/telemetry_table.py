@@ -51,7 +51,6 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS, v.Sticks, 0.5, RC_CHANNELS, make.rc_channels),
     Row(m.MAVLINK_MSG_ID_HOME_POSITION, v.GlobalPosition, inf, NO_STREAM, make.home_position),
     Row(m.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, v.Motors, 0.5, RC_CHANNELS, make.servo_output_raw),
-    Row(m.MAVLINK_MSG_ID_SCALED_PRESSURE, v.Pressure, 0.5, RAW_SENSORS, make.scaled_pressure),
     Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, make.attitude_quaternion),
     Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, v.GlobalPosition, inf, POSITION, make.local_position_ned),
     Row(m.MAVLINK_MSG_ID_RAW_IMU, v.ImuSample, inf, RAW_SENSORS, make.raw_imu),

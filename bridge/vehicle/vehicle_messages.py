@@ -418,13 +418,6 @@ def servo_output_raw(at: Moment) -> Message:
     return messages.MAVLink_servo_output_raw_message(at.boot_ms * 1000 & 0xFFFFFFFF, 0, *outputs)
 
 
-def scaled_pressure(at: Moment) -> Message:
-    """SCALED_PRESSURE: hPa, 0.01 degrees Celsius."""
-    pressure = at.need(v.Pressure)
-    temperature = _fit(round(pressure.temperature_c * 100), 16)
-    return messages.MAVLink_scaled_pressure_message(at.boot_ms, pressure.absolute_hpa, 0.0, temperature)
-
-
 def attitude_quaternion(at: Moment) -> Message:
     """ATTITUDE_QUATERNION: w, x, y, z."""
     now = at.need(v.Orientation)
