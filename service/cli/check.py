@@ -96,7 +96,7 @@ def check(
     try:
         rules = _RULES[kind](RuleSettings(limit_m, saved))
     except ValueError as error:
-        raise click.UsageError(f"{settings_file}: {error}; save the settings again") from error
+        raise click.UsageError(f"{settings_file}: {error}; correct that line, or save the settings again") from error
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
     ctx.exit(max(codes, key=_RANKS.index))
 

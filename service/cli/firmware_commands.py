@@ -49,8 +49,10 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     """
     try:
         program = parse_image(read_file(image, FirmwareFileError), shown_path(image))
-    except (FirmwareFileError, ImageError) as error:
+    except FirmwareFileError as error:
         fail(error, UNREADABLE)
+    except ImageError as error:
+        fail(f"{error}; give the {_BUILT} that `naze-bridge firmware build` makes", UNREADABLE)
     try:
         check_patched(program)
     except ImageError as error:
@@ -68,7 +70,8 @@ def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
         contents = read_file(backup, FirmwareFileError)
         check_backup(contents)
     except (FirmwareFileError, ImageError) as error:
-        fail(error if isinstance(error, FirmwareFileError) else f"{shown_path(backup)}: {error}", UNREADABLE)
+        remedy = "give a backup that `naze-bridge firmware flash` stored"
+        fail(error if isinstance(error, FirmwareFileError) else f"{shown_path(backup)}: {error}; {remedy}", UNREADABLE)
     _flash(client, {"do": "restore-firmware", "image": _as_text(contents), "battery": battery})
 
 

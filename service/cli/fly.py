@@ -3,7 +3,6 @@
 
 from enum import IntEnum
 from pathlib import Path
-from typing import NoReturn
 
 import click
 from rich.table import Table
@@ -86,7 +85,7 @@ def fly(
         if log is not None:
             flight, title = logged_sortie(read_file(log, FileError), records), shown_path(log)
         elif image is None:
-            _refuse("fly needs a firmware, --image FILE, or the telemetry log of a flight, --log FILE")
+            fail("give a firmware, --image FILE, or the telemetry log of a flight, --log FILE", FlyStatus.UNUSABLE)
         else:
             weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
             contents = read_file(flash, FileError) if flash else None
@@ -94,9 +93,9 @@ def fly(
             flight = fly_sortie(read_image(image), image.name, records, weather, mass, lies, contents, progress)
             title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
     except (SortieError, FileError) as error:
-        _refuse(str(error))
+        fail(error, FlyStatus.UNUSABLE)
     except click.ClickException as error:
-        _refuse(error.message)
+        fail(error.message, FlyStatus.UNUSABLE)
     if as_json:
         print_json({"file": shown_path(file), **flight.to_json()})
     else:
@@ -111,12 +110,8 @@ def fly(
         try:
             write_file(svg, flight.svg(title), FileError)
         except FileError as error:
-            _refuse(str(error))
+            fail(error, FlyStatus.UNUSABLE)
     ctx.exit(FlyStatus.FLOWN if flight.is_flown else FlyStatus.NOT_FLOWN)
-
-
-def _refuse(text: str) -> NoReturn:
-    fail(text, FlyStatus.UNUSABLE)
 
 
 def _records(file: Path) -> tuple[WpRecord, ...]:
@@ -127,9 +122,8 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
         items = load_mission(file)
         verdict = check_list(items, rules(settings), assumed_home(items, shown_path(file)))
     except (MissionFileError, SettingsError) as error:
-        _refuse(str(error))
+        fail(error, FlyStatus.UNUSABLE)
     if verdict.result is not Result.ACCEPTED:
-        _refuse(
-            f"{shown_path(file)} is no mission to fly: {verdict.findings[-1].text() if verdict.findings else 'empty'}"
-        )
+        why = verdict.findings[-1].text() if verdict.findings else "empty"
+        fail(f"{shown_path(file)} is no mission to fly: {why}", FlyStatus.UNUSABLE)
     return verdict.records

@@ -55,7 +55,9 @@ class _Main(LazyGroup):
             error.show()
             sys.exit(error.exit_code)
         except click.ClickException as error:
-            complain(error.format_message())
+            text, context = error.format_message(), getattr(error, "ctx", None)
+            needs_help = text.startswith(("Missing ", "No such option", "Got unexp")) and not text.endswith("?")
+            complain(f"{text.rstrip('.')}; see `{context.command_path} --help`" if needs_help and context else text)
             sys.exit(error.exit_code)
         except click.Abort as error:
             if isinstance(error.__context__, EOFError):

@@ -165,6 +165,13 @@ def diff(client: BridgeClient, first: str, second: str) -> None:
     (left, _), (right, _) = (_source(client, each, held) for each in (first, second))
     left = by_setting(left, right)
     right = by_setting(right, left)
+    if _is_file(first) is not _is_file(second):
+        # A `diff all` has only what differs from the defaults.
+        file, values = (first, left) if _is_file(first) else (second, right)
+        absent = len((left | right).keys() - values.keys())
+        left, right = ({name: each[name] for name in values if name in each} for each in (left, right))
+        if absent:
+            complain(f"{absent} settings are not in {shown_path(Path(file))}: not compared")
     rows = settings_difference(_like(left, right, held), _like(right, left, held))
     if client.as_json:
         print_json({"equal": not rows, "changes": [asdict(row) for row in rows]})
@@ -239,7 +246,7 @@ def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[
     if name == _BOARD:
         held = held or _held(client)
         return _values(held), held["board"]
-    if name.isascii() and name.isdecimal() and not Path(name).exists():
+    if not _is_file(name):
         if int(name) > MOST:
             raise click.UsageError(f"{name} is not a backup's number: see `naze-bridge settings history`")
         stored = replace(client, fc=None).ask({"do": "backup", "number": int(name)})
@@ -251,6 +258,11 @@ def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[
     if found.unread:
         complain(f"{shown_path(Path(name))}, lines that are not settings: {unread_text(found.unread)}")
     return found.values, found.board
+
+
+def _is_file(name: str) -> bool:
+    """False for `board` and the number of a backup."""
+    return name != _BOARD and (Path(name).exists() or not (name.isascii() and name.isdecimal()))
 
 
 def _held(client: BridgeClient) -> Json:

@@ -28,7 +28,8 @@ def explain_port_error(path: str, error: OSError) -> str:
         host = Host()
         others = (process for process in host.processes() if process.pid != os.getpid())
         holder = next((process for process in others if host.has_open(process, path)), None)
-        return f"{path} is busy: {holder or 'another program'} has it open; stop it, or name another port"
+        how = f": {host.stop_command(holder)}" if holder else ""
+        return f"{path} is busy: {holder or 'another program'} has it open; name another port, or stop it{how}"
     if code in (errno.ENOTTY, errno.EISDIR):
         return f"{path} is not a serial port"
     return f"{path} cannot be opened: {error.strerror or error}"

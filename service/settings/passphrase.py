@@ -33,16 +33,10 @@ def most_bits(passphrase: str) -> float:
     Each character counts with the classes of characters in use, but not if it repeats or continues the one before
     ("aa", "ab", "21"), nor if both have already followed each other ("qwertqwert").
     """
-    used = [each for each in _CLASSES if not set(each).isdisjoint(passphrase)]
-    known = "".join(used)
+    known = "".join(each for each in _CLASSES if not set(each).isdisjoint(passphrase))
     choices = len(known) + (_OTHERS if any(each not in known for each in passphrase) else 0)
-    seen: set[str] = set()
-    bits = 0.0
-    for before, each in zip(" " + passphrase, passphrase, strict=False):
-        if abs(ord(each) - ord(before)) > 1 and before + each not in seen:
-            bits += math.log2(choices)
-        seen.add(before + each)
-    return bits
+    pairs = {*zip(" " + passphrase, passphrase, strict=False)}
+    return sum(math.log2(choices) for before, each in pairs if abs(ord(each) - ord(before)) > 1)
 
 
 def weakness(passphrase: str) -> str | None:

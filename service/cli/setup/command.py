@@ -130,7 +130,10 @@ def setup(
         return
     machine = Machine(host)
     if steps:
-        _agree(yes=yes)
+        if not is_root():
+            fail(_NEEDS_ROOT)
+        if not yes and not click.confirm("Make these changes?", default=True):
+            raise click.Abort
         _carry_out([step for step in steps if not step.cuts_network], machine)
     _print_addresses(host, answers)
     if new_key:
@@ -163,13 +166,6 @@ def _switch_network(steps: list[Step], machine: Machine, hotspot: str | None, *,
     if ask:
         click.prompt("Press Enter when you have noted the above", default="", show_default=False)
     _carry_out(steps, machine)
-
-
-def _agree(*, yes: bool) -> None:
-    if not is_root():
-        fail(_NEEDS_ROOT)
-    if not yes and not click.confirm("Make these changes?", default=True):
-        raise click.Abort
 
 
 def _print_kept(host: Host, fc: str | None, *, page: bool) -> None:

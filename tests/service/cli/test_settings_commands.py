@@ -94,11 +94,13 @@ def test_a_dump_is_compared_and_restored_and_the_other_lines_are_listed(tuned: D
     assert settings(tuned, "diff", file).stdout == "no difference\n"
     file.write_text("FW: TestCode3\nfeature GPS\nP_ROLL = 44\n")
     different = settings(tuned, "diff", file, "--json")
-    assert {"name": "p_roll", "left": 44.0, "right": 35} in json.loads(different.stdout)["changes"]
+    assert json.loads(different.stdout)["changes"] == [{"name": "p_roll", "left": 44.0, "right": 35}]
+    assert "200 settings are not in" in different.stderr
     restored = settings(tuned, "restore", file)
     assert restored.returncode == 0, restored
     assert "lines that are not settings: 1 (FW:), 2 (feature)" in restored.stderr
     assert value(tuned, "p_roll") == "44"
+    assert settings(tuned, "diff", file).stdout == "no difference\n"
 
 
 def test_a_backup_is_compared_and_restored_by_the_number(tuned: Daemon) -> None:
