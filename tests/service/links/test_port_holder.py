@@ -17,10 +17,8 @@ def test_the_message_names_the_program() -> None:
     with subprocess.Popen([sys.executable, "-c", _OPEN, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout is not None
         other.stdout.readline()
-        with pytest.raises(
-            PortError,
-            match=rf"{name} is busy: python\S* \(pid {other.pid}\) has it open; name another port, or stop it: sudo kill {other.pid}",
-        ):
+        holder, remedy = rf"python\S* \(pid {other.pid}\)", f"name another port, or stop it: sudo kill {other.pid}"
+        with pytest.raises(PortError, match=f"{name} is busy: {holder} has it open; {remedy}"):
             open_serial(name)
         other.kill()
     os.close(near)
