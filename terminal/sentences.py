@@ -36,11 +36,15 @@ def fail(text: object, status: int = 1) -> NoReturn:
 
 def show_secret(what: str, secret: str, kept_in: str, code: str) -> None:
     """Print a secret and the QR code of `code` to a terminal, else the name of the file that has the secret."""
-    if not sys.stdout.isatty():
+    if not is_terminal():
         click.echo(f"{what}: in {kept_in}")
         return
     click.echo(f"{what}: {secret}")
     print_code(code)
+
+
+def is_terminal() -> bool:
+    return sys.stdout.isatty()
 
 
 def print_code(text: str) -> None:
