@@ -22,6 +22,8 @@ from protocols.plain_text import file_text, shown
 #: Characters. The parsed tree takes up to forty times the memory of the text.
 _MAX_SIZE = 2 * 2**20
 _FEET = 0.3048
+#: What is compressed by other methods unpacks all at once, however large.
+_BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 #: The frame of a height, by KML's altitudeMode. Heights of paths on the ground have no meaning.
 _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
 _CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
@@ -75,7 +77,8 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
     """A zipped KML."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            inside = next(each for each in archive.infolist() if _is_kml(each))
+            kmls = (each for each in archive.infolist() if each.filename.lower().endswith(".kml"))
+            inside = next(each for each in kmls if each.compress_type in _BOUNDED)
             with archive.open(inside) as file:
                 kml = file.read(_MAX_SIZE + 1)
     except StopIteration:
@@ -83,12 +86,6 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
         raise MissionFileError(name, "", "this KMZ is damaged", "save it again") from None
     return read_kml(parse_xml(file_text(kml), name), name, note, alt_m)
-
-
-def _is_kml(inside: zipfile.ZipInfo) -> bool:
-    """True for a file that can be unpacked in pieces: the other methods of compression unpack all at once."""
-    is_bounded = inside.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-    return is_bounded and inside.filename.lower().endswith(".kml")
 
 
 def read_gpx(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:

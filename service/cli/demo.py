@@ -35,7 +35,6 @@ from terminal.sentences import fail, say
 _EXAMPLE = Path(__file__).parent / "naze-field.waypoints"
 #: Python's start included: about 3 s on a Pi Zero, far longer if it is busy.
 _CONNECT_TIMEOUT_S = 30.0
-
 _HEARTBEAT_INTERVAL_S = 0.2
 _REPLY_TIMEOUT_S = 1.0
 _TRIES = 8
