@@ -22,7 +22,7 @@
 #   make suite-trial    all tests in a bare Debian, as root and as a user (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make cli-page       regenerate docs/cli.md
-#   make rules-page     regenerate the table of docs/mission-rules.md from the rules
+#   make rules-page     regenerate the tables of docs/mission-rules.md
 #   make rights-page    regenerate the tables of docs/rights.md from protocols/rights/
 #   make inav-page      regenerate the table of docs/inav.md
 #   make config-sample  regenerate examples/config.toml
@@ -162,9 +162,11 @@ inav-page: $(VENV)/.test-ready
 # The table of Harakiri's records for each command.
 rules-page: $(VENV)/.test-ready
 	$(BIN)/python -m generators.rules_page > docs/rules.table
-	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page -->/!d}' \
-	    -e '/begin: make rules-page/r docs/rules.table' docs/mission-rules.md
-	rm docs/rules.table
+	$(BIN)/python -m generators.rules_page flights > docs/flights.table
+	sed -i -e '/begin: make rules-page/,/end: make rules-page/{/make rules-page.* -->/!d}' \
+	    -e '/begin: make rules-page -->/r docs/rules.table' \
+	    -e '/begin: make rules-page flights -->/r docs/flights.table' docs/mission-rules.md
+	rm docs/rules.table docs/flights.table
 
 # The table of the effect of each request.
 rights-page: $(VENV)/.test-ready

@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table in docs/mission-rules.md is up to date with the rules."""
+"""The tables in docs/mission-rules.md are up to date, and name tests that exist."""
 
 from pathlib import Path
 
-from generators.rules_page import table
+import pytest
+
+from generators.rules_page import FLIGHTS, flights, table
+
+_ROOT = Path(__file__).parents[2]
 
 
-def test_the_table_is_up_to_date() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "mission-rules.md").read_text()
-    assert f"<!-- begin: make rules-page -->\n{table()}<!-- end: make rules-page -->" in page, "run make rules-page"
+@pytest.mark.parametrize(("name", "text"), [("rules-page", table()), ("rules-page flights", flights())])
+def test_the_table_is_up_to_date(name: str, text: str) -> None:
+    page = (_ROOT / "docs" / "mission-rules.md").read_text()
+    assert f"<!-- begin: make {name} -->\n{text}<!-- end: make {name} -->" in page, "run make rules-page"
+
+
+@pytest.mark.parametrize("by", sorted(set(FLIGHTS.values())))
+def test_each_rule_names_an_existing_test_or_its_source(by: str) -> None:
+    file, _, name = by.partition("::")
+    assert f"\ndef {name}(" in (_ROOT / file).read_text() if name else by.startswith("source: ")
