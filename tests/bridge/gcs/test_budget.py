@@ -8,9 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.budget import Budget, Budgets, Cost
-from protocols.mission_item import MissionResult
 from protocols.msp.frame import MspParser
-from tests.support.conversations import Upload, waypoints
 from tests.support.world import GroundStation, World, ready_world
 
 
@@ -84,28 +82,6 @@ def writes_left(world: World, station: GroundStation) -> int:
     found = world.inside.ground.station(station.peer)
     assert found is not None
     return sum(found.allows(Cost.FLASH) for _ in range(500))
-
-
-def test_an_unchanged_list_is_not_counted_as_a_flash_write() -> None:
-    world = ready_world()
-    pilot = GroundStation(world)
-    for _ in range(40):
-        assert Upload(pilot, waypoints(3)).run(2) is MissionResult.ACCEPTED
-    assert writes_left(world, pilot) == 199
-
-
-def test_a_command_that_the_board_did_not_execute_is_not_counted_as_a_flash_write() -> None:
-    world = ready_world()
-    pilot = GroundStation(world)
-    world.faults.armed = True
-    for message in (
-        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 1, *[0] * 5),
-        m.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 500, 9),
-    ):
-        # Before the bridge has noticed that it is armed.
-        pilot.send(message)
-        world.run(1)
-    assert writes_left(world, pilot) == 200
 
 
 def test_a_flood_of_counts_is_not_logged() -> None:
