@@ -11,6 +11,7 @@
 #define LEAN_S 0.2f        /* how fast the craft follows a lean */
 #define AIR_S 0.7f         /* memory of the air's push; after take-off it begins with ... */
 #define AIR_LEAST_S 0.1f   /* ... this, and grows */
+#define STEADY_S 5.0f      /* ... and of the lean into the wind: without a fix the smaller one is kept, a gust passes */
 #define HIGH_PASS_S 2.0f
 #define KEEP_S 6.0f          /* the compass sums' memory */
 #define AGREE 0.8f         /* least part of both motions that is the same, squared */
@@ -130,6 +131,7 @@ static void turn_felt(st_t *s, float angle)
     s->wind = turned(s->wind, angle);
     s->air = turned(s->air, angle);
     s->leant = turned(s->leant, angle);
+    s->steady = turned(s->steady, angle);
     s->base = sum(velocity, s->felt, -1.0f);
 }
 
@@ -164,7 +166,13 @@ static void compare_compass(st_t *s, st_vector_t gps, float dt)
     if (agreement(s, best) > agreement(s, s->lag) + CLEAR)
         s->lag = (uint8_t)best;
     s->compass_known = true;
-    angle = atan2f(s->compared[s->lag].agree.e, s->compared[s->lag].agree.n) * CD_PER_RAD;
+    angle = 18000.0f; /* the smallest error that explains it */
+    for (i = 0; i < ST_LAGS; i++)
+        if (agreement(s, i) > agreement(s, best) - CLEAR) {
+            const float here = atan2f(s->compared[i].agree.e, s->compared[i].agree.n) * CD_PER_RAD;
+            if (fabsf(here) < fabsf(angle))
+                angle = here;
+        }
     s->correcting = fabsf(angle) > (s->correcting ? DONE_CD : SURE_CD);
     if (!s->correcting)
         return;
@@ -234,7 +242,7 @@ void st_begin(st_t *s, st_vector_t lean_cd)
     s->wind = none;
     s->leant.n = lean_cd.n * factor;
     s->leant.e = lean_cd.e * factor;
-    s->asked = s->leant;
+    s->asked = s->steady = s->leant;
     s->air = sum(none, s->leant, -1.0f);
     s->air_s = AIR_S;
 }
@@ -296,9 +304,11 @@ st_vector_t st_steer(st_t *s, const st_order_t *order)
     s->steers = true;
     if (is_blind(s) || order->mode == ST_LEAN) {
         s->wanted = none;
-        s->asked = limited(sum(s->wind, s->air, -1.0f), MOST_WIND * most);
+        const st_vector_t now = sum(s->wind, s->air, -1.0f); /* in a gust, perhaps */
+        s->asked = limited(is_blind(s) && length(s->steady) < length(now) ? s->steady : now, MOST_WIND * most);
         return as_lean(s->asked);
     }
+    s->steady = sum(s->steady, sum(sum(s->wind, s->air, -1.0f), s->steady, -1.0f), dt / STEADY_S);
     change = sum(wanted(s, order, gains), s->wanted, -1.0f);
     s->wanted = sum(s->wanted, limited(change, (order->mode >= ST_PASS ? ST_GATHER_CM_S2 : ST_STOP_CM_S2) * dt), 1.0f);
     off = sum(s->wanted, s->velocity, -1.0f);

@@ -23,7 +23,8 @@
  *   follows it by at most ST_STEP_CD a fix. The caller adds it to the heading that it turns the lean and the accelerometer by.
  *
  *   A fix is old when it arrives, and in a turn that looks like a compass error. So the GPS's velocity is compared with what was
- *   felt ST_LAGS ages ago, and the age counts with which the two agree best.
+ *   felt ST_LAGS ages ago. Of the ages with which the two agree, the best counts for the steering, and for the compass
+ *   that which needs the smallest error.
  */
 #ifndef NAZE_STEER_H
 #define NAZE_STEER_H
@@ -103,6 +104,7 @@ typedef struct {
     st_vector_t wanted;                  /* velocity */
     st_vector_t asked, leant;            /* acceleration by the lean, cm/s2: asked for, and as the craft follows */
     st_vector_t air, wind;               /* ... by the air, and what is asked for in addition */
+    st_vector_t steady;                  /* ... against the wind over the last seconds */
     st_filter_t gps;
     st_felt_t compared[ST_LAGS];
     float moved, air_s;

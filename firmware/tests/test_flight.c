@@ -1049,6 +1049,37 @@ static void test_takeoff_drift(void)
     CHECK(takeoff_drift(800) < 2.9);
 }
 
+/* How fast a craft that has lost its fix in a gusty wind is after 20 s: the mean of twenty, m/s. */
+static double blind_speed(void)
+{
+    double speeds = 0;
+    for (int i = 0; i < 20; i++) {
+        flight_t flight;
+        lies_t lies = honest;
+        nf_record_t record = random_record(WAYPOINT);
+        lies.gust_cm_s = 200;
+        list.count = 0;
+        add(&record);
+        prepare_with(&flight, true, &lies); /* the list is refused, so it holds */
+        craft.height = 1000;
+        craft.wind = (vector_t){500, 0};
+        flight.in.switch_on = flight.toggled = true;
+        step(&flight);
+        flight.toggled = false;
+        go_on(&flight, 30);
+        flight.in.fix = false;
+        go_on(&flight, 20);
+        CHECK(flight.core.state == NF_NO_FIX || flight.core.state == NF_SINK);
+        speeds += hypot(craft.v.n, craft.v.e) / 100;
+    }
+    return speeds / 20;
+}
+
+static void test_blind(void)
+{
+    CHECK(blind_speed() < 3.3);
+}
+
 static void test_braking(void)
 {
     double farthest;
@@ -1088,6 +1119,7 @@ int main(int argc, char **argv)
     test_braking();
     test_old_fixes();
     test_takeoff_drift();
+    test_blind();
     for (seed = first; seed < first + lists; seed++) {
         chance_state = seed * 0x9E3779B97F4A7C15u + 1;
         if (seed % 4)
