@@ -51,8 +51,8 @@ class Sitl:
     """One INAV on the field at LAT_E7, LON_E7."""
 
     def __init__(self, binary: Path, folder: Path, port: int) -> None:
-        help_text = subprocess.run([binary, "--help"], capture_output=True, text=True, check=False).stdout
-        has_port = "--tcpbaseport" in help_text
+        told = subprocess.run([binary, "--help"], capture_output=True, text=True, check=False)
+        has_port = "--tcpbaseport" in told.stdout + told.stderr
         self._port = port if has_port else _FIXED_PORT
         command = [str(binary), f"--path={folder / 'eeprom.bin'}", *[f"--tcpbaseport={port}"] * has_port]
         self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
