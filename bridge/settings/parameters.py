@@ -26,6 +26,7 @@ from bridge.settings.parameter_names import parameter_names
 from bridge.settings.setting_work import Answer
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
+from bridge.voice.stations import Kind
 from protocols.float32 import single
 from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import Message, messages
@@ -203,7 +204,9 @@ class Parameters:
             sender.say(Happening(sentences.RADIUS_KEPT, refused.why.values) if is_routine else refused.why)
         if name.upper() in self._values():
             self._error(sender, name, _ERRORS.get(cause, messages.MAV_PARAM_ERROR_PERMISSION_DENIED))
-        self._send(sender, name)
+        # To Mission Planner any value means "successfully saved"; only for the radius its Write waits for one.
+        if sender.station.behaviour.kind is not Kind.MISSION_PLANNER or name.upper() == WP_RADIUS:
+            self._send(sender, name)
 
     def follow(self) -> None:
         """Send the values that have changed to all stations, which keep a copy, once any has read them.

@@ -293,6 +293,10 @@ class Incoming:
                 of_type.downloads.forget(sender)
             # Messages about no list have the type of missions.
             (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(sender, message, now)
+        elif msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST and of_type is not None:
+            # Mission Planner ignores a refusal, and times out after 5 s.
+            sender.say(sentences.ONLY_MISSIONS())
+            sender.to(m.MAVLink_mission_count_message(sender.sysid, sender.compid, 0, mission_type))
         elif msgid != m.MAVLINK_MSG_ID_MISSION_ACK:
             if msgid == m.MAVLINK_MSG_ID_MISSION_COUNT:
                 sender.say(NO_PLACES.why)

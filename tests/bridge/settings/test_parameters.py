@@ -316,6 +316,18 @@ def test_a_refused_value_is_answered_with_the_reason_and_the_value_in_force(
     assert sentence in " ".join(station.texts())
 
 
+def test_mission_planner_fails_a_refused_value() -> None:
+    """It says "1 parameters successfully saved" after any PARAM_VALUE, and "Set P_ROLL Failed" without."""
+    world, station = settled_world()
+    station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTRA3, 1, 1))
+    world.run(1)
+    refused = {each.get_type() for each in reply_to(world, station, b"P_ROLL", 201.0)}
+    assert "PARAM_ERROR" in refused
+    assert "PARAM_VALUE" not in refused
+    # A Write sets the radius, and fails without an answer.
+    assert "PARAM_VALUE" in {each.get_type() for each in reply_to(world, station, b"WPNAV_RADIUS", 3000.0)}
+
+
 def test_a_value_that_real32_rounds_is_not_written_back() -> None:
     """Mission Planner writes a whole file of parameters, with the values that it had read."""
     world, station = settled_world()

@@ -164,11 +164,20 @@ def test_a_seq_past_the_end_is_an_invalid_sequence() -> None:
         assert (ack.get_type(), ack.type) == ("MISSION_ACK", A.INVALID_SEQUENCE)
 
 
+@pytest.mark.parametrize("mission_type", [1, 2])
+def test_a_list_that_is_not_stored_here_reads_as_empty(mission_type: int) -> None:
+    """Mission Planner ignores a refusal, and shows a timeout instead."""
+    _, station = holding()
+    (count,) = [each for each in ask(station, list_message(mission_type)) if each.get_type() != "STATUSTEXT"]
+    assert (count.get_type(), count.count, count.mission_type) == ("MISSION_COUNT", 0, mission_type)
+    assert station.texts() == ["Fences and rally points are not stored here"]
+
+
 @pytest.mark.parametrize("mission_type", [1, 2, 7, 255])
 def test_another_mission_type_is_unsupported(mission_type: int) -> None:
     _, station = holding()
     for message in (
-        list_message(mission_type),
+        *([list_message(mission_type)] if mission_type > 2 else []),
         request_message(0, mission_type=mission_type),
         request_message(3, as_int=False, mission_type=mission_type),
     ):
