@@ -50,8 +50,6 @@ _TOLD: Mapping[int, Sentence[()]] = {
     m.MAVLINK_MSG_ID_GIMBAL_MANAGER_SET_PITCHYAW: sentences.NO_CAMERA,
     m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: sentences.FLY,
 }
-#: A channel of RC_CHANNELS_OVERRIDE that is released or left alone.
-_NO_OVERRIDE = (0, 0xFFFF)
 
 #: Messages of a mission transfer: hundreds a second over a fast link. All others are rare.
 _OF_A_TRANSFER = frozenset(
@@ -270,7 +268,7 @@ class Incoming:
         """Handle a frame for the bridge's vehicle, if it is understood and the sender has not sent too many."""
         if msgid in _TOLD:
             # A joystick sends 50 a second: they must not use up the limit for answers.
-            self._tell(sender, frame, msgid)
+            self._commands.tell(sender, _TOLD[msgid]())
             return
         handler = self._handlers.get(msgid)
         if handler is None or (message := decode(frame)) is None:
@@ -331,13 +329,6 @@ class Incoming:
     def _data_stream(self, sender: Sender, message: Message, _now: float) -> None:
         rate_hz = message.req_message_rate if message.start_stop else 0
         self._vehicle.set_stream(sender.station, message.req_stream_id, 1 / rate_hz if rate_hz else inf)
-
-    def _tell(self, sender: Sender, frame: MavlinkFrame, msgid: int) -> None:
-        if msgid == m.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE:
-            message = decode(frame)
-            if message is None or all(getattr(message, f"chan{n}_raw") in _NO_OVERRIDE for n in range(1, 9)):
-                return
-        self._commands.tell(sender, _TOLD[msgid]())
 
     def _ping(self, sender: Sender, message: Message, _now: float) -> None:
         if message.target_system != 0:

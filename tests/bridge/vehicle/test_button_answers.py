@@ -127,13 +127,6 @@ def test_messages_without_an_acknowledgement_are_answered_once(message: Message,
     assert station.messages("MISSION_COUNT")
 
 
-def test_channels_that_are_only_released_are_not_a_joystick() -> None:
-    world, station = connected()
-    station.send(m.MAVLink_rc_channels_override_message(1, 1, *[0, 65535] * 4))
-    world.run(0.5)
-    assert station.texts() == []
-
-
 def test_a_plan_with_only_a_fence_clears_the_mission_and_says_both() -> None:
     """QGroundControl writes its mission as an empty list, and leaves out the fence that is not stored here."""
     world, station = connected()
