@@ -61,7 +61,8 @@ namespace MissionPlanner.GCSViews {
     public partial class FlightPlanner : Window {
         public static FlightPlanner instance = new FlightPlanner();
         public List<Locationwp> Rows = new List<Locationwp>();
-        public readonly Control TXT_homelat = new Control(), TXT_homelng = new Control(), TXT_homealt = new Control();
+        public readonly Control TXT_homelat = new Control { Text = "45.3838" }, TXT_homelng = new Control { Text = "8.4733" };
+        public readonly Control TXT_homealt = new Control { Text = "131" };
         public readonly Control TXT_WPRad = new Control { Text = "2" }, TXT_loiterrad = new Control { Text = "30" };
         public readonly Control cmb_missiontype = new Control { SelectedValue = MAVLink.MAV_MISSION_TYPE.MISSION };
         readonly Control chk_usemavftp = new Control();

@@ -11,19 +11,21 @@ from tests.support.plan import PlanRow, plain_plan
 from tests.support.real_planner import RealPlanner
 
 KINDS = {"naze": (), "inav": ("--kind", "inav"), "multiwii": ("--kind", "multiwii")}
-NO_ARMING, FLY = "Arm and disarm with the transmitter", "It is flown with the transmitter"
+NO_ARMING, FLY = "Arm and disarm with the transmitter", "Fly the craft with the transmitter"
+#: A reason is given once for attempts that follow faster.
+ATTEMPT_S = 2
 FAILED = "The Command failed to execute"
 #: The control and the choice, the button, the title of the dialog, the line on the HUD.
 BUTTONS = {
     "arm": ("", "", "BUT_ARM_Click", "Arm failed", NO_ARMING),
     "mode": ("CMB_modes", "RTL", "BUT_setmode_Click", "", "Modes are set with the transmitter switches"),
-    "set WP": ("CMB_setwp", "2", "BUT_setwp_Click", "", "This flight controller flies no missions"),
+    "set WP": ("CMB_setwp", "2", "BUT_setwp_Click", "", "This flight controller cannot fly missions"),
     "fly here": ("", "", "goHereToolStripMenuItem_Click", "", FLY),
     "take off": ("", "", "takeOffToolStripMenuItem_Click", "", FLY),
-    "home": ("", "", "setHomeHereToolStripMenuItem_Click", "", "Home is where the craft is armed"),
-    "trigger": ("", "", "triggerCameraToolStripMenuItem_Click", "", "No camera or gimbal is controlled here"),
+    "home": ("", "", "setHomeHereToolStripMenuItem_Click", "", "Home is set where the craft is armed"),
+    "trigger": ("", "", "triggerCameraToolStripMenuItem_Click", "", "Cameras and gimbals are not controlled here"),
     "safety": ("CMB_action", "Toggle_Safety_Switch", "BUTactiondo_Click", "", NO_ARMING),
-    "parachute": ("CMB_action", "Do_Parachute", "BUTactiondo_Click", FAILED, "No effect here: DO_PARACHUTE"),
+    "parachute": ("CMB_action", "Do_Parachute", "BUTactiondo_Click", FAILED, "DO_PARACHUTE is not supported"),
     "loiter": ("CMB_action", "Loiter_Unlim", "BUTactiondo_Click", FAILED, FLY),
 }  # fmt: skip
 
@@ -76,6 +78,7 @@ def test_rally_points_that_are_not_stored_are_refused_to_a_write_and_missing_for
     planner, _ = session()
     assert planner.read("RALLY")[1] == []
     assert dialogs(planner, 0) == []
+    time.sleep(ATTEMPT_S)
     planner.write(RALLY, tab="RALLY")
     planner.wait_for("line", "Fences and rally points are not stored here")
     (dialog,) = dialogs(planner, 0)
@@ -146,11 +149,12 @@ def test_an_armed_craft_refuses_a_write_and_can_be_read(session: Sessions) -> No
         assert "DENIED" in dialog
         planner.wait_for("message", "Armed: disarm to change the mission", began)
         assert len(planner.read()[1]) == len(rows)
+        time.sleep(ATTEMPT_S)
 
 
 @pytest.mark.parametrize(
     "link",
-    [{"loss": 0.08}, {"delay_s": 0.2}, {"repeats": 0.3, "delay_s": 0.05, "jitter_s": 0.1}],
+    [{"loss": 0.03}, {"delay_s": 0.2}, {"repeats": 0.3, "delay_s": 0.05, "jitter_s": 0.1}],
     ids=["loss", "delay", "copies"],
 )
 def test_on_a_bad_link_a_mission_arrives_or_its_loss_is_reported(session: Sessions, link: dict[str, float]) -> None:
