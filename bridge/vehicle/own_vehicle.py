@@ -47,7 +47,7 @@ _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
 _POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
-#: A message, and the reading that triggers it, or None if the clock.
+#: A message, and the reading that triggers it, or None for the clock.
 _Trigger = tuple[Row, type[Reading] | None]
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
 _EXTENDED_SYS_STATE = _ROWS[messages.MAVLINK_MSG_ID_EXTENDED_SYS_STATE]
@@ -205,7 +205,7 @@ class OwnVehicle:
         return bool(made)
 
     def set_interval(self, station: GroundStation, msgid: int, interval_s: float | None) -> bool:
-        """Set the interval of a message for one ground station. Returns None if the default. False: no such message."""
+        """Set the interval of a message for one ground station, or the default if None. False: no such message."""
         if msgid not in _ROWS:
             return False
         # The polls follow later: that costs a step for every message and ground station.
