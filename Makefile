@@ -19,6 +19,7 @@
 #   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13;
 #                       SUITE=bookworm-to-trixie: after an upgrade of the system)
+#   make pi-trial       boot it as a Raspberry Pi 3 in QEMU: doctor, missions, arming (root; CONTRIBUTING.md)
 #   make suite-trial    all tests in a bare Debian, as root and as a user (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make cli-page       regenerate docs/cli.md
@@ -39,7 +40,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .NOTPARALLEL:
-.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial suite-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
+.PHONY: rules-page rights-page demo test lint bench pictures real-board soak fuzz deb release deb-trial suite-trial pi-trial image-check lock config-sample cli-page inav-page zenoh-schemas clean
 
 # The programs that the tests use, with their Debian packages: installed if missing and if run as root, like the compilers
 # of firmware/. Without one of the needed programs there is no test run, without one of the others its tests are skipped.
@@ -117,6 +118,9 @@ deb-trial: deb
 
 image-check: deb
 	deb/trial dist/naze-bridge_*_$(ARCH).deb deb/first-hour-inside $(SUITE)
+
+pi-trial: $(VENV)/.test-ready
+	$(BIN)/python -m deb.pi_trial $(ARGS)
 
 suite-trial:
 	deb/suite-trial $(or $(SUITE),bookworm) '$(ARGS)'

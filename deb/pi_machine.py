@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A Raspberry Pi 3 in QEMU: its card, its UART on the header, its network, and the plug that can be pulled.
+
+QEMU starts a kernel itself, so this program does what a Pi's boot loader does for `dtoverlay=disable-bt`: the header's
+pins belong to the PL011, not to Bluetooth. Kernel and device tree are Debian's.
+"""
+
+import os
+import re
+import select
+import shutil
+import socket
+import struct
+import subprocess
+import termios
+import threading
+import time
+import tty
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from deb.build import build
+
+PROJECT = Path(__file__).resolve().parent.parent
+CACHE = Path.home() / ".cache" / "naze-bridge-pi-trial"
+_PACKAGES = (
+    *("systemd", "systemd-sysv", "systemd-timesyncd", "dbus", "udev", "kmod", "iproute2", "procps", "initramfs-tools"),
+    *("zstd", "python3", "openssh-client", "openssh-server", "network-manager", "libpam-systemd"),
+)
+_MIB = 1 << 20
+#: A card's size must be a power of two for QEMU. FAT, then ext4, as on a card of Raspberry Pi OS.
+_SIZE, _FAT_AT, _FAT_SIZE = 2048 * _MIB, _MIB, 128 * _MIB
+_EXT4_AT = _FAT_AT + _FAT_SIZE
+_PL011, _MINI_UART = "/soc/serial@7e201000", "/soc/serial@7e215040"
+_BOOT_FILES = {
+    "config.txt": "[all]\nenable_uart=1\ndtoverlay=disable-bt\n",
+    "cmdline.txt": "console=tty1 root=/dev/mmcblk0p2 rootfstype=ext4 fsck.repair=yes rootwait\n",
+    "kernel8.img": "",
+}
+#: Makes the bare Debian a Pi: the modules of its devices, and the names of the UARTs (raspberrypi-sys-mods).
+_FURNISH = r"""
+echo pi >/etc/hostname
+printf '127.0.0.1\tlocalhost\n127.0.1.1\tpi\n' >/etc/hosts
+useradd --create-home --groups dialout pilot
+printf '/dev/mmcblk0p2 / ext4 defaults,noatime 0 1\n/dev/mmcblk0p1 /boot/firmware vfat defaults 0 2\n' >/etc/fstab
+mkdir -p /boot/firmware /var/log/journal
+sed -i 's/^MODULES=.*/MODULES=list/' /etc/initramfs-tools/initramfs.conf
+printf '%s\n' bcm2835 sdhci_iproc mmc_block ext4 crc32c_generic >>/etc/initramfs-tools/modules
+apt-get install --yes --no-install-recommends linux-image-arm64
+printf '%s\n' bcm2835_wdt dwc2 >/etc/modules-load.d/pi.conf
+# QEMU has no chips for these drivers, and emulates slowly.
+printf 'blacklist %s\n' vc4 hci_uart brcmfmac snd_bcm2835 bcm2835_v4l2 >/etc/modprobe.d/pi.conf
+printf 'UsePAM no\nUseDNS no\n' >/etc/ssh/sshd_config.d/pi.conf
+cat >/usr/lib/udev/pi-serial <<'NAME'
+#!/bin/sh
+node=$(readlink -f "/sys/class/tty/$1/device/of_node")
+for name in serial0 serial1; do
+    [ "$(tr -d '\0' </proc/device-tree/aliases/$name)" != "${node#/sys/firmware/devicetree/base}" ] || echo $name
+done
+NAME
+chmod +x /usr/lib/udev/pi-serial
+echo 'SUBSYSTEM=="tty", KERNEL=="ttyAMA*|ttyS*", PROGRAM="/usr/lib/udev/pi-serial %k", SYMLINK+="%c"' \
+    >/etc/udev/rules.d/99-com.rules
+systemctl mask apt-daily.timer apt-daily-upgrade.timer e2scrub_all.timer fstrim.timer
+apt-get clean
+"""
+_INSTALL = """
+dpkg --install /root/naze-bridge.deb
+printf 'fc = "/dev/serial0"\\n[web]\\nlisten = "0.0.0.0:8080"\\n' >>/etc/naze-bridge/config.toml
+systemctl enable naze-bridge
+"""
+
+
+class TrialError(Exception):
+    """The trial failed; one sentence."""
+
+
+def run(*command: str | Path, **options: object) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload]
+    if done.returncode:
+        raise TrialError(f"{' '.join(map(str, command))}: {done.returncode}\n{done.stdout}{done.stderr}")
+    return str(done.stdout)
+
+
+def make_card(image: Path) -> None:
+    """Write a card with Debian and this project's package. The Debian is made once, and kept in CACHE."""
+    bare = CACHE / "bare"
+    run(PROJECT / "deb" / "bare", "bookworm", bare, ",".join(_PACKAGES), "arm64")
+    if not (bare / "boot" / "firmware").exists():
+        key = CACHE / "key"
+        key.unlink(missing_ok=True)
+        run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key)
+        (bare / "root" / ".ssh").mkdir(exist_ok=True)
+        shutil.copy(key.with_suffix(".pub"), bare / "root" / ".ssh" / "authorized_keys")
+        _inside(bare, _FURNISH)
+    with TemporaryDirectory(dir=CACHE) as folder:
+        root = Path(folder, "root")
+        run("cp", "-a", bare, root)
+        shutil.copy(build("arm64", ("3.11",), Path(folder), compression="none"), root / "root" / "naze-bridge.deb")
+        _inside(root, _INSTALL)
+        _write_card(image, root)
+
+
+def _inside(root: Path, script: str) -> None:
+    """Run a script in a root for arm64, by QEMU's user mode."""
+    run("chroot", root, "sh", "-eu", "-c", script, env={"PATH": os.defpath + ":/usr/sbin:/sbin", "LC_ALL": "C"})
+
+
+def _write_card(image: Path, root: Path) -> None:
+    image.unlink(missing_ok=True)
+    with image.open("wb") as file:
+        file.truncate(_SIZE)
+        file.seek(440)
+        file.write(struct.pack("<IH", 0x6E617A65, 0))
+        for kind, at, size in ((0x0C, _FAT_AT, _FAT_SIZE), (0x83, _EXT4_AT, _SIZE - _EXT4_AT)):
+            file.write(struct.pack("<B3xB3xII", 0, kind, at // 512, size // 512))
+        file.seek(510)
+        file.write(b"\x55\xaa")
+    run("mkfs.vfat", "-F", "32", "-s", "1", "--offset", str(_FAT_AT // 512), image, str(_FAT_SIZE // 1024))
+    for name, text in _BOOT_FILES.items():
+        subprocess.run(("mcopy", "-o", "-i", f"{image}@@{_FAT_AT}", "-", f"::/{name}"), input=text.encode(), check=True)
+    place = f"offset={_EXT4_AT}"
+    run("mke2fs", "-q", "-F", "-t", "ext4", "-d", root, "-E", place, image, f"{(_SIZE - _EXT4_AT) // 1024}k")
+
+
+class _Wire(threading.Thread):
+    """The wire from the Pi's header to a simulated board's terminal, at the speed that the Pi has set.
+
+    QEMU's UARTs carry bytes without a speed, but its trace has the speeds of the PL011.
+    """
+
+    def __init__(self, path: Path, board: Path, trace: Path, speeds: list[int]) -> None:
+        super().__init__(daemon=True)
+        self._board = os.open(board, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(self._board)
+        self._pi = socket.socket(socket.AF_UNIX)
+        self._pi.connect(str(path))
+        self._trace = trace.open("rb")
+        self._speeds = speeds
+
+    def run(self) -> None:
+        with suppress(OSError):
+            while True:
+                ready, _, _ = select.select([self._pi.fileno(), self._board], [], [], 0.05)
+                self._follow_speed()
+                if self._pi.fileno() in ready:
+                    if not (data := self._pi.recv(4096)):
+                        break
+                    os.write(self._board, data)
+                if self._board in ready:
+                    self._pi.sendall(os.read(self._board, 4096))
+        os.close(self._board)
+
+    def _follow_speed(self) -> None:
+        for line in self._trace.readlines():
+            if (found := re.search(rb"new baudrate ([1-9]\d*)", line)) is not None:
+                speed = min((9600, 19200, 38400, 57600, 115200), key=lambda each: abs(each - int(found[1])))
+                self._speeds.append(speed)
+                attributes = termios.tcgetattr(self._board)
+                attributes[4] = attributes[5] = getattr(termios, f"B{speed}")
+                termios.tcsetattr(self._board, termios.TCSANOW, attributes)
+
+
+class Pi:
+    """A Pi with a card. `folder` has its files; `board` is the terminal of the flight controller on its header.
+
+    `speeds`: those that the Pi has set on the header's UART since it was plugged in.
+    """
+
+    def __init__(self, card: Path, folder: Path, board: Path) -> None:
+        self._card, self._folder, self._board = card, folder, board
+        self._qemu: subprocess.Popen[bytes] | None = None
+        self.ports = {"ssh": 0, "gcs": 0, "page": 0}
+        self.speeds: list[int] = []
+        files = CACHE / "bare"
+        self._kernel, self._initrd = next(files.glob("boot/vmlinuz-*")), next(files.glob("boot/initrd.img-*"))
+        self._tree = folder / "pi.dtb"
+        shutil.copy(next(files.glob("usr/lib/linux-image-*/broadcom/bcm2837-rpi-3-b.dtb")), self._tree)
+        run("fdtput", "-t", "s", self._tree, "/aliases", "serial0", _PL011)
+        run("fdtput", "-t", "s", self._tree, "/aliases", "serial1", _MINI_UART)
+        run("fdtput", "-r", self._tree, f"{_PL011}/bluetooth")
+
+    def start(self) -> None:
+        """Plug the Pi in, and wait until it answers over its network."""
+        pins, trace = self._folder / "header", self._folder / "trace"
+        trace.write_bytes(b"")
+        for path in (pins, self._folder / "ssh"):
+            path.unlink(missing_ok=True)
+        self.ports = {name: _free_port() for name in self.ports}
+        forwarded = (("tcp", "ssh", 22), ("udp", "gcs", 14550), ("tcp", "page", 8080))
+        net = ",".join(f"hostfwd={kind}:127.0.0.1:{self.ports[name]}-:{port}" for kind, name, port in forwarded)
+        log = (self._folder / "qemu.log").open("ab")
+        self._qemu = subprocess.Popen(
+            [
+                *("qemu-system-aarch64", "-M", "raspi3b", "-display", "none", "-no-reboot", "-monitor", "none"),
+                # The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
+                *("-icount", "shift=1"),
+                *("-kernel", self._kernel, "-initrd", self._initrd, "-dtb", self._tree),
+                *("-append", _BOOT_FILES["cmdline.txt"].strip()),
+                *("-drive", f"if=sd,format=raw,file={self._card}"),
+                *("-chardev", f"socket,id=header,path={pins},server=on,wait=off", "-serial", "chardev:header"),
+                *("-device", "usb-net,netdev=n0", "-netdev", f"user,id=n0,{net}"),
+                # An FTDI adapter.
+                *("-chardev", "null,id=usb", "-device", "usb-serial,chardev=usb,always-plugged=on"),
+                *("-trace", "pl011_baudrate_change", "-D", trace),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+        )
+        while not pins.exists():
+            if self._qemu.poll() is not None:
+                raise TrialError(f"QEMU did not start: see {log.name}")
+            time.sleep(0.05)
+        self.speeds = []
+        _Wire(pins, self._board, trace, self.speeds).start()
+        self.until("true", 1800)
+
+    def run(self, script: str) -> str:
+        """Run a shell script on the Pi; returns its output."""
+        options = {"StrictHostKeyChecking": "no", "UserKnownHostsFile": "/dev/null", "LogLevel": "ERROR"}
+        options |= {"ControlMaster": "auto", "ControlPath": f"{self._folder}/ssh", "ControlPersist": "yes"}
+        options |= {"ConnectTimeout": "300"}
+        words = [word for each in options.items() for word in ("-o", "=".join(each))]
+        login = ("-p", str(self.ports["ssh"]), "-i", CACHE / "key", "root@127.0.0.1")
+        return run("ssh", *words, *login, script, stdin=subprocess.DEVNULL)
+
+    def until(self, script: str, seconds: float = 900) -> str:
+        """Wait until a script succeeds; returns its output."""
+        end = time.monotonic() + seconds
+        while True:
+            try:
+                return self.run(script)
+            except TrialError as error:
+                if time.monotonic() > end:
+                    raise TrialError(f"still after {seconds:.0f} s: {error}") from None
+            time.sleep(1)
+
+    def cut(self) -> None:
+        """Pull the plug."""
+        if self._qemu is not None:
+            self._qemu.kill()
+            self._qemu.wait()
+            self._qemu = None
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
