@@ -630,11 +630,9 @@ static bool interrupted(nf_t *f, const nf_input_t *in)
             enter(f, in, NF_NO_FIX);
         } else if (state != NF_HELD)
             stop(f, in, NF_FIX_LOST);
-    } else if (state == NF_NO_FIX) {
-        if (in->stick) /* the time without a fix counts from the pilot's last move */
-            f->entered_ms = in->now_ms;
+    } else if (state == NF_NO_FIX)
         return false;
-    } else if (steered && is_wild(f, in) && (lands(f) || state == NF_HELD)) {
+    else if (steered && is_wild(f, in) && (lands(f) || state == NF_HELD)) {
         if (state == NF_HELD)
             land(f, in, NF_HOLD_LOST);
         f->unsteered = true;
@@ -740,6 +738,8 @@ static void fly(nf_t *f, const nf_input_t *in)
     case NF_NO_FIX:
         if (in->fix)
             stop(f, in, f->reason);
+        else if (in->stick)
+            f->entered_ms = in->now_ms;
         break;
     case NF_HOME:
         if (f->climbs_first && f->height_error_cm <= CLIMBED_CM) {

@@ -9,14 +9,11 @@
 #define CD_PER_RAD 5729.578f
 #define FOLLOW 0.9f        /* of the difference between GPS and estimate, at each fix */
 #define LEAN_S 0.2f        /* how fast the craft follows a lean */
-#define AIR_S 0.7f         /* memory of the air's push; after take-off it begins with ... */
-#define AIR_LEAST_S 0.1f   /* ... this, and grows */
-#define STEADY_S 5.0f      /* ... and of the lean into the wind: without a fix the smaller one is kept, a gust passes */
+#define AIR_S 0.7f         /* memory of the air's push */
 #define HIGH_PASS_S 2.0f
 #define KEEP_S 6.0f          /* the compass sums' memory */
 #define AGREE 0.8f         /* least part of both motions that is the same, squared */
 #define MOST_WIND 0.8f     /* of the greatest lean */
-#define CLEAR 0.02f       /* another lag fits better: by this */
 #define SURE_CD 1000.0f    /* a smaller error is not corrected, ... */
 #define DONE_CD 300.0f     /* ... a larger one until it is this small */
 
@@ -56,13 +53,6 @@ void st_start(st_t *s, uint32_t now_ms)
 {
     memset(s, 0, sizeof *s);
     s->now_ms = s->fix_ms = s->memory_ms = now_ms;
-    s->lag = ST_LAG;
-}
-
-/* The age of a fix, ms. */
-static uint32_t lag_ms(unsigned lag)
-{
-    return ST_LEAST_LAG_MS + lag * ST_LAG_STEP_MS;
 }
 
 static bool is_blind(const st_t *s)
@@ -72,10 +62,10 @@ static bool is_blind(const st_t *s)
 
 /* ---- velocity --------------------------------------------------------------------------------------------------------- */
 
-/* The felt velocity when the fix was measured, if it is as old as this lag. */
-static st_vector_t felt_at_fix(const st_t *s, unsigned lag)
+/* The felt velocity when the fix was measured. */
+static st_vector_t felt_at_fix(const st_t *s)
 {
-    return s->memory[(s->newest + ST_MEMORY - lag_ms(lag) / ST_MEMORY_MS) % ST_MEMORY];
+    return s->memory[(s->newest + ST_MEMORY - ST_LAG_MS / ST_MEMORY_MS) % ST_MEMORY];
 }
 
 static void remember(st_t *s)
@@ -89,90 +79,59 @@ static void remember(st_t *s)
 
 static void correct_velocity(st_t *s, st_vector_t gps)
 {
-    const st_vector_t off = sum(gps, sum(s->base, felt_at_fix(s, s->lag), 1.0f), -1.0f);
+    const st_vector_t off = sum(gps, sum(s->base, felt_at_fix(s), 1.0f), -1.0f);
     s->base = sum(s->base, off, s->has_fix ? FOLLOW : 1.0f);
     s->has_fix = true;
 }
 
 /* ---- compass ---------------------------------------------------------------------------------------------------------- */
 
-static st_vector_t high_passed(st_filter_t *f, st_vector_t value, float keep)
+static st_vector_t high_passed(st_t *s, unsigned which, st_vector_t value, float keep)
 {
-    const st_vector_t before = f->once;
-    f->once.n = keep * (f->once.n + value.n - f->last.n);
-    f->once.e = keep * (f->once.e + value.e - f->last.e);
-    f->twice.n = keep * (f->twice.n + f->once.n - before.n);
-    f->twice.e = keep * (f->twice.e + f->once.e - before.e);
-    f->last = value;
-    return f->twice;
-}
-
-static void restart_filter(st_filter_t *f, st_vector_t value)
-{
-    memset(f, 0, sizeof *f);
-    f->last = value;
+    const st_vector_t before = s->once[which];
+    st_vector_t *once = &s->once[which], *twice = &s->twice[which];
+    once->n = keep * (once->n + value.n - s->last[which].n);
+    once->e = keep * (once->e + value.e - s->last[which].e);
+    twice->n = keep * (twice->n + once->n - before.n);
+    twice->e = keep * (twice->e + once->e - before.e);
+    s->last[which] = value;
+    return *twice;
 }
 
 /* Everything that was felt is turned by the part of the compass error that is corrected now, radians. */
 static void turn_felt(st_t *s, float angle)
 {
     unsigned i;
-    const st_vector_t velocity = sum(s->base, s->felt, 1.0f);
+    const st_vector_t velocity = sum(s->base, s->felt, 1.0f), sums = {s->agree_re, s->agree_im};
+    const st_vector_t left = turned(sums, -angle);
     s->felt = turned(s->felt, angle);
     for (i = 0; i < ST_MEMORY; i++)
         s->memory[i] = turned(s->memory[i], angle);
-    for (i = 0; i < ST_LAGS; i++) {
-        st_felt_t *felt = &s->compared[i];
-        felt->filter.last = turned(felt->filter.last, angle);
-        felt->filter.once = turned(felt->filter.once, angle);
-        felt->filter.twice = turned(felt->filter.twice, angle);
-        felt->agree = turned(felt->agree, -angle);
-    }
+    s->last[1] = turned(s->last[1], angle);
+    s->once[1] = turned(s->once[1], angle);
+    s->twice[1] = turned(s->twice[1], angle);
     s->wind = turned(s->wind, angle);
     s->air = turned(s->air, angle);
     s->leant = turned(s->leant, angle);
-    s->steady = turned(s->steady, angle);
     s->base = sum(velocity, s->felt, -1.0f);
-}
-
-/* The part of both motions that is the same. */
-static float agreement(const st_t *s, unsigned lag)
-{
-    const st_felt_t *felt = &s->compared[lag];
-    return felt->moved < ST_ENOUGH ? 0.0f : (felt->agree.n * felt->agree.n + felt->agree.e * felt->agree.e) / (s->moved * felt->moved);
+    s->agree_re = left.n;
+    s->agree_im = left.e;
 }
 
 static void compare_compass(st_t *s, st_vector_t gps, float dt)
 {
     const float keep = HIGH_PASS_S / (HIGH_PASS_S + dt), age = 1.0f - dt / KEEP_S;
-    const st_vector_t v = high_passed(&s->gps, gps, keep);
+    const st_vector_t v = high_passed(s, 0, gps, keep), a = high_passed(s, 1, felt_at_fix(s), keep);
     float angle, step;
-    unsigned i, best = s->lag;
+    s->agree_re = age * s->agree_re + a.n * v.n + a.e * v.e;
+    s->agree_im = age * s->agree_im + a.n * v.e - a.e * v.n;
     s->moved = age * s->moved + v.n * v.n + v.e * v.e;
-    for (i = 0; i < ST_LAGS; i++) {
-        st_felt_t *felt = &s->compared[i];
-        const st_vector_t a = high_passed(&felt->filter, felt_at_fix(s, i), keep);
-        felt->agree.n = age * felt->agree.n + a.n * v.n + a.e * v.e;
-        felt->agree.e = age * felt->agree.e + a.n * v.e - a.e * v.n;
-        felt->moved = age * felt->moved + a.n * a.n + a.e * a.e;
-    }
-    if (s->moved < ST_ENOUGH)
+    s->felt_moved = age * s->felt_moved + a.n * a.n + a.e * a.e;
+    if (s->moved < ST_ENOUGH || s->felt_moved < ST_ENOUGH ||
+        s->agree_re * s->agree_re + s->agree_im * s->agree_im < AGREE * s->moved * s->felt_moved)
         return;
-    for (i = 0; i < ST_LAGS; i++)
-        if (agreement(s, i) > agreement(s, best))
-            best = i;
-    if (agreement(s, best) < AGREE)
-        return;
-    if (agreement(s, best) > agreement(s, s->lag) + CLEAR)
-        s->lag = (uint8_t)best;
     s->compass_known = true;
-    angle = 18000.0f; /* the smallest error that explains it */
-    for (i = 0; i < ST_LAGS; i++)
-        if (agreement(s, i) > agreement(s, best) - CLEAR) {
-            const float here = atan2f(s->compared[i].agree.e, s->compared[i].agree.n) * CD_PER_RAD;
-            if (fabsf(here) < fabsf(angle))
-                angle = here;
-        }
+    angle = atan2f(s->agree_im, s->agree_re) * CD_PER_RAD;
     s->correcting = fabsf(angle) > (s->correcting ? DONE_CD : SURE_CD);
     if (!s->correcting)
         return;
@@ -194,8 +153,7 @@ static void feel_air(st_t *s, st_vector_t felt)
         st_vector_t push = sum(felt, s->leant, -dt);
         push.n /= dt;
         push.e /= dt;
-        s->air_s = s->air_s + dt < AIR_S ? s->air_s + dt : AIR_S;
-        s->air = sum(s->air, sum(push, s->air, -1.0f), dt / (s->air_s > AIR_LEAST_S ? s->air_s : AIR_LEAST_S));
+        s->air = sum(s->air, sum(push, s->air, -1.0f), dt / AIR_S);
     }
 }
 
@@ -205,11 +163,9 @@ void st_sense(st_t *s, const st_sense_t *in)
     if (!in->flying) {
         const int32_t correction_cd = s->correction_cd;
         const bool known = s->compass_known;
-        const uint8_t lag = s->lag;
         st_start(s, in->now_ms);
         s->correction_cd = correction_cd;
         s->compass_known = known;
-        s->lag = lag;
         return;
     }
     s->felt = sum(s->felt, in->felt, 1.0f);
@@ -223,10 +179,10 @@ void st_sense(st_t *s, const st_sense_t *in)
             compare_compass(s, in->velocity, (float)since_ms * 0.001f);
         else {
             s->has_fix = in_time;
-            unsigned i;
-            restart_filter(&s->gps, in->velocity);
-            for (i = 0; i < ST_LAGS; i++)
-                restart_filter(&s->compared[i].filter, felt_at_fix(s, i));
+            s->last[0] = in->velocity;
+            s->last[1] = felt_at_fix(s);
+            memset(s->once, 0, sizeof s->once);
+            memset(s->twice, 0, sizeof s->twice);
         }
         correct_velocity(s, in->velocity);
     }
@@ -242,9 +198,8 @@ void st_begin(st_t *s, st_vector_t lean_cd)
     s->wind = none;
     s->leant.n = lean_cd.n * factor;
     s->leant.e = lean_cd.e * factor;
-    s->asked = s->steady = s->leant;
+    s->asked = s->leant;
     s->air = sum(none, s->leant, -1.0f);
-    s->air_s = AIR_S;
 }
 
 float st_speed(const st_t *s)
@@ -254,7 +209,7 @@ float st_speed(const st_t *s)
 
 st_vector_t st_ahead(const st_t *s, st_vector_t way)
 {
-    return sum(way, s->velocity, -(float)(lag_ms(s->lag) + s->now_ms - s->fix_ms) * 0.001f);
+    return sum(way, s->velocity, -(float)(ST_LAG_MS + s->now_ms - s->fix_ms) * 0.001f);
 }
 
 static st_vector_t wanted(const st_t *s, const st_order_t *order, const st_gains_t *gains)
@@ -304,11 +259,9 @@ st_vector_t st_steer(st_t *s, const st_order_t *order)
     s->steers = true;
     if (is_blind(s) || order->mode == ST_LEAN) {
         s->wanted = none;
-        const st_vector_t now = sum(s->wind, s->air, -1.0f); /* in a gust, perhaps */
-        s->asked = limited(is_blind(s) && length(s->steady) < length(now) ? s->steady : now, MOST_WIND * most);
+        s->asked = limited(sum(s->wind, s->air, -1.0f), MOST_WIND * most);
         return as_lean(s->asked);
     }
-    s->steady = sum(s->steady, sum(sum(s->wind, s->air, -1.0f), s->steady, -1.0f), dt / STEADY_S);
     change = sum(wanted(s, order, gains), s->wanted, -1.0f);
     s->wanted = sum(s->wanted, limited(change, (order->mode >= ST_PASS ? ST_GATHER_CM_S2 : ST_STOP_CM_S2) * dt), 1.0f);
     off = sum(s->wanted, s->velocity, -1.0f);

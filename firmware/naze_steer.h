@@ -13,18 +13,13 @@
  *   off. There are two sets of these gains: st_careful until the compass error is known, then st_firm.
  *
  *   Margin, without any correction of the compass: st_careful flies to a place and stays there with a compass that is off by
- *   45 degrees, at a GPS lag of 0.2 to 0.5 s, with a craft of 0.5 to 2 kg; st_firm with 30 degrees. At a lag of 0.8 s they do
- *   with 30 and 15. test_flight.c computes it.
+ *   45 degrees, at a GPS lag of 0.2 to 0.5 s, with a craft of 0.5 to 2 kg; st_firm with 30 degrees. test_flight.c computes it.
  *
  * COMPASS
  *   The accelerometer's change of velocity is turned by the heading, the GPS's is not: the angle between the two is the
  *   compass error. Both are high-passed (two stages of 2 s), so a tilted level or a slow drift does not count, and summed over
  *   about 6 s. The error is used once the craft has moved enough (ST_ENOUGH) and the two agree; above 10 degrees `correction_cd`
  *   follows it by at most ST_STEP_CD a fix. The caller adds it to the heading that it turns the lean and the accelerometer by.
- *
- *   A fix is old when it arrives, and in a turn that looks like a compass error. So the GPS's velocity is compared with what was
- *   felt ST_LAGS ages ago. Of the ages with which the two agree, the best counts for the steering, and for the compass
- *   that which needs the smallest error.
  */
 #ifndef NAZE_STEER_H
 #define NAZE_STEER_H
@@ -36,31 +31,16 @@
 #define ST_GATHER_CM_S2 150.0f /* greatest change of the wanted velocity, ... */
 #define ST_STOP_CM_S2 600.0f   /* ... and when it stops, */
 #define ST_STOP_SPEED 1.8f     /* ... with this gain for the speed, 1/s: without a place to fly to it may be higher */
-#define ST_LEAST_LAG_MS 120u   /* the age of a fix is one of ST_LAGS, */
-#define ST_LAG_STEP_MS 160u    /* ... this far apart; */
-#define ST_LAGS 6u
-#define ST_LAG 1u              /* ... this one until it is known */
+#define ST_LAG_MS 250u         /* the assumed age of a fix */
 #define ST_ENOUGH 25000.0f     /* (cm/s)2, summed */
 #define ST_STEP_CD 500
-#define ST_MEMORY 24u          /* of the felt velocity, every ST_MEMORY_MS */
+#define ST_MEMORY 16u          /* of the felt velocity, every ST_MEMORY_MS */
 #define ST_MEMORY_MS 40u
 #define ST_BLIND_MS 2000u      /* without a fix for longer than this, the velocity is unknown */
 
 typedef struct {
     float n, e;
 } st_vector_t;
-
-/* Two stages of a high-pass. */
-typedef struct {
-    st_vector_t last, once, twice;
-} st_filter_t;
-
-/* The felt motion compared with the GPS's, if fixes have one of the lags. */
-typedef struct {
-    st_filter_t filter;
-    st_vector_t agree; /* complex: its angle is the compass error */
-    float moved;
-} st_felt_t;
 
 typedef struct {
     float position, speed, wind; /* 1/s, 1/s, 1/s2 */
@@ -104,12 +84,10 @@ typedef struct {
     st_vector_t wanted;                  /* velocity */
     st_vector_t asked, leant;            /* acceleration by the lean, cm/s2: asked for, and as the craft follows */
     st_vector_t air, wind;               /* ... by the air, and what is asked for in addition */
-    st_vector_t steady;                  /* ... against the wind over the last seconds */
-    st_filter_t gps;
-    st_felt_t compared[ST_LAGS];
-    float moved, air_s;
+    st_vector_t last[2], once[2], twice[2]; /* high-passes of the GPS's velocity and the felt one */
+    float agree_re, agree_im, moved, felt_moved;
     uint32_t now_ms, fix_ms, memory_ms;
-    uint8_t newest, lag;
+    uint8_t newest;
     bool has_fix;                        /* a velocity is known */
     bool correcting;                     /* the compass */
     bool steers;                         /* at the last call */

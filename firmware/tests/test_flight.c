@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_RECORDS = 9, HISTORY = 64, RADIUS_CM = 200, LIMIT_S = 900 };
+enum { MAX_RECORDS = 9, HISTORY = 32, RADIUS_CM = 200, LIMIT_S = 900 };
 #define STEP_MS 20 /* macros, because clang 19 warns of enumerators in floating-point expressions */
 #define CRUISE_CM_S 350
 #define LEAN_CD 3500
@@ -172,15 +172,10 @@ static bool read_record(void *self, uint16_t number, uint8_t *record)
 
 /* ---- the craft -------------------------------------------------------------------------------------------------------- */
 
-/* The craft, and what is wrong with it. */
+/* What is wrong with the craft; all 0 except mass and lag: a good one. */
 typedef struct {
     double mass;      /* kg */
-    double drag;      /* N for each m/s of airspeed */
-    double thrust;    /* the greatest, as a part of the weight */
-    double follow_s;  /* how slowly it follows a lean: motors and attitude control */
-    double gust_cm_s;
     double lag_s;     /* of the GPS */
-    double wash_cm;   /* the barometer reads so much too low on the ground while the motors run */
     double compass;   /* degrees, clockwise */
     double magnetism; /* of the motors: the greatest further error, which turns with the nose */
     double jump_cm;   /* of the GPS's place, northward, ... */
@@ -210,24 +205,19 @@ typedef struct {
 
 static craft_t craft;
 
-static const lies_t honest = {.mass = 1.0, .drag = 0.25, .thrust = 2.5, .follow_s = 0.2, .gust_cm_s = 100, .lag_s = 0.2, .vibration = 0.5};
+static const lies_t honest = {1.0, 0.2, 0, 0, 0, 0, 0, 0, 0, 0.5};
 
 static lies_t random_lies(void)
 {
     lies_t lies = honest;
     lies.mass = between(50, 200) / 100.0;
-    lies.drag = lies.mass * between(10, 40) / 100.0;
-    lies.thrust = between(140, 400) / 100.0;
-    lies.follow_s = between(10, 35) / 100.0;
-    lies.gust_cm_s = between(0, 200);
-    lies.lag_s = between(10, 80) / 100.0;
-    lies.wash_cm = one_in(2) ? between(0, 100) : 0;
+    lies.lag_s = between(10, 50) / 100.0;
     if (one_in(2))
         lies.compass = between(-45, 45);
     if (one_in(4))
         lies.magnetism = between(0, 15);
     lies.level = between(-20, 20) / 10.0;
-    lies.vibration = between(5, 40) / 10.0;
+    lies.vibration = between(5, 15) / 10.0;
     lies.baro_cm_s = one_in(3) ? between(-3, 3) : 0;
     return lies;
 }
@@ -246,8 +236,8 @@ static void reset_craft(bool aloft, const lies_t *lies)
     craft.wind.n = wind * cos(from);
     craft.wind.e = wind * sin(from);
     if (aloft) { /* leans into the wind, as a pilot's position hold does */
-        craft.lean.n = -craft.wind.n * lies->drag / lies->mass / GRAVITY;
-        craft.lean.e = -craft.wind.e * lies->drag / lies->mass / GRAVITY;
+        craft.lean.n = -craft.wind.n * 0.25 / lies->mass / GRAVITY;
+        craft.lean.e = -craft.wind.e * 0.25 / lies->mass / GRAVITY;
     }
     for (int i = 0; i < HISTORY; i++)
         craft.old_at[i] = craft.at;
@@ -269,7 +259,7 @@ static double heading_error(void)
 /* A pilot who has the craft keeps it where it is. */
 static vector_t by_hand(void)
 {
-    const double drag = craft.lies.drag / craft.lies.mass;
+    const double drag = 0.25 / craft.lies.mass;
     return (vector_t){(-craft.v.n - craft.wind.n * drag) / GRAVITY, (-craft.v.e - craft.wind.e * drag) / GRAVITY};
 }
 
@@ -281,13 +271,13 @@ static void lean_craft(const nf_output_t *out, double dt)
         lean = by_hand();
     lean.n += craft.mislevel.n + craft.lies.level * acos(-1) / 180;
     lean.e += craft.mislevel.e;
-    craft.lean.n += (lean.n - craft.lean.n) * dt / craft.lies.follow_s;
-    craft.lean.e += (lean.e - craft.lean.e) * dt / craft.lies.follow_s;
+    craft.lean.n += (lean.n - craft.lean.n) * dt / 0.2;
+    craft.lean.e += (lean.e - craft.lean.e) * dt / 0.2;
 }
 
 static void push(double *at, double *v, double *mislevel, double *felt, double lean, double wind, double dt)
 {
-    const double acceleration = GRAVITY * tan(fmax(-1.2, fmin(1.2, lean))) + craft.lies.drag / craft.lies.mass * (wind - *v);
+    const double acceleration = GRAVITY * tan(fmax(-1.2, fmin(1.2, lean))) + 0.25 / craft.lies.mass * (wind - *v);
     *mislevel += (acceleration / GRAVITY - *mislevel) * dt / 8;
     *felt += (acceleration - *mislevel * GRAVITY) * dt;
     *v += acceleration * dt;
@@ -317,8 +307,8 @@ static void move_craft(const nf_output_t *out)
     double climb = 0;
     craft.time_s += dt;
     craft.baro_cm = fmax(-100, fmin(100, craft.baro_cm + craft.lies.baro_cm_s * dt)); /* more flies a low list into the ground */
-    craft.gust.n += -craft.gust.n * dt / 3 + noise() * craft.lies.gust_cm_s * sqrt(2 * dt / 3);
-    craft.gust.e += -craft.gust.e * dt / 3 + noise() * craft.lies.gust_cm_s * sqrt(2 * dt / 3);
+    craft.gust.n += -craft.gust.n * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
+    craft.gust.e += -craft.gust.e * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
     switch (out->mode) {
     case NF_TAKEOFF:
         craft.lift_s += dt;
@@ -347,7 +337,7 @@ static void move_craft(const nf_output_t *out)
         push(&craft.at.n, &craft.v.n, &craft.mislevel.n, &craft.felt.n, craft.lean.n, craft.wind.n + craft.gust.n, dt / 2);
         push(&craft.at.e, &craft.v.e, &craft.mislevel.e, &craft.felt.e, craft.lean.e, craft.wind.e + craft.gust.e, dt / 2);
     }
-    craft.climb += fmin((climb - craft.climb) / 0.4, GRAVITY * (craft.lies.thrust * cos(lean_of_craft() / 180 * acos(-1)) - 1)) * dt;
+    craft.climb += (climb - craft.climb) * dt / 0.4;
     craft.height += craft.climb * dt;
     if (craft.height <= 0)
         touch_down(out, dt);
@@ -499,7 +489,7 @@ static void check_step(flight_t *flight)
         if (!flight->touched && craft.lies.compass == 0 && craft.lies.magnetism == 0 && craft.lies.jump_cm == 0 && craft.height > 0 && in->now_ms - flight->entered_ms > 15000) {
             const nf_place_t *to = roi ? roi : &out->target;
             if (nf_distance(&craft.measured, to, NULL) > 2500)
-                CHECK(fabs(remainder(bearing_to(to) - craft.heading, 360)) <= (craft.lies.lag_s <= 0.5 ? 35 : 45));
+                CHECK(fabs(remainder(bearing_to(to) - craft.heading, 360)) <= 25);
         }
     }
     if (core->state != before || core->record != number || flight->toggled) {
@@ -555,8 +545,7 @@ static void sense(flight_t *flight)
     craft.felt.n = craft.felt.e = 0;
     in->lean_cd.n = (float)(lean.n * RADIAN_CD);
     in->lean_cd.e = (float)(lean.e * RADIAN_CD);
-    const double wash = craft.lift_s > 0 || craft.aloft ? craft.lies.wash_cm * exp(-craft.height / 50) : 0;
-    in->height_cm = (int32_t)lround(craft.height + craft.baro_cm - wash + noise() * 5);
+    in->height_cm = (int32_t)lround(craft.height + craft.baro_cm + noise() * 5);
     in->climb_cm_s = (int32_t)lround(craft.climb + noise() * 5);
     in->heading_cd = (int32_t)lround(remainder(craft.heading + heading_error(), 360) * 100);
     in->flying = craft.flying;
@@ -627,7 +616,7 @@ static void fly_undisturbed(void)
     if (flight.core.state == NF_HELD)
         CHECK(flight.core.reason == NF_ON_GROUND ? !takes_off : flight.core.reason == NF_BAD_ORDER ? list.count == 2 : lies.mass < 0.8 && flight.core.reason == NF_STALLED);
     else if (last == LAND)
-        CHECK(!craft.armed && nf_distance(&craft.measured, &flight.core.target, NULL) <= 3 * RADIUS_CM);
+        CHECK(!craft.armed && nf_distance(&craft.measured, &flight.core.target, NULL) <= 2 * RADIUS_CM);
     else
         CHECK(flight.core.state == (last == LOITER_UNLIM ? NF_STAY : NF_DONE));
     flight.in.switch_on = false;
@@ -955,10 +944,6 @@ static void test_margin(void)
                 CHECK(stays_within(mass / 2.0, lag / 10.0, side * 30, true, ST_STAY) < 12);
                 CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false, ST_STOP) < 2);
             }
-    for (int side = -1; side <= 1; side += 2) {
-        CHECK(stays_within(1, 0.8, side * 30, false, ST_STAY) < 12);
-        CHECK(stays_within(1, 0.8, side * 15, true, ST_STAY) < 12);
-    }
     CHECK(stays_within(1, 0.2, 120, true, ST_STAY) > 12); /* the test can fail */
 }
 
@@ -994,90 +979,6 @@ static double stops_within(double mass, double wind_cm_s, double *farthest)
         *farthest = fmax(*farthest, fabs(craft.at.n - stood) / 100);
     }
     return (stood - begun) / 100;
-}
-
-/* A fix as old as 0.8 s does not look like a compass error, and a take-off in wind stays near its place. */
-static void test_old_fixes(void)
-{
-    for (int side = -1; side <= 1; side++) {
-        flight_t flight;
-        lies_t lies = honest;
-        lies.lag_s = 0.8;
-        lies.compass = side * 45;
-        fly_north(&flight, &lies);
-        go_on(&flight, 60);
-        CHECK(flight.core.state == NF_DONE);
-        CHECK(fabs(lies.compass + flight.core.steer.correction_cd / 100.0) < 20);
-    }
-}
-
-/* How far a take-off in this wind drifts: the mean of ten, m. */
-static double takeoff_drift(double wind_cm_s)
-{
-    double drifts = 0;
-    for (int i = 0; i < 10; i++) {
-        flight_t flight;
-        nf_record_t record = random_record(TAKEOFF);
-        double farthest = 0;
-        list.count = 0;
-        record.height_m = 10;
-        add(&record);
-        add(&record);
-        record.command = LOITER_UNLIM;
-        record.place = place_at(0, 0);
-        add(&record);
-        prepare(&flight, false);
-        craft.wind = (vector_t){wind_cm_s, 0};
-        craft.at = (vector_t){0, 0};
-        go_on(&flight, 1);
-        flight.in.switch_on = flight.toggled = true;
-        step(&flight);
-        flight.toggled = false;
-        for (int k = 0; k < 15000 / STEP_MS; k++) {
-            step(&flight);
-            farthest = fmax(farthest, hypot(craft.at.n, craft.at.e) / 100);
-        }
-        CHECK(craft.height > 500);
-        drifts += farthest;
-    }
-    return drifts / 10;
-}
-
-static void test_takeoff_drift(void)
-{
-    CHECK(takeoff_drift(500) < 1.9);
-    CHECK(takeoff_drift(800) < 2.9);
-}
-
-/* How fast a craft that has lost its fix in a gusty wind is after 20 s: the mean of twenty, m/s. */
-static double blind_speed(void)
-{
-    double speeds = 0;
-    for (int i = 0; i < 20; i++) {
-        flight_t flight;
-        lies_t lies = honest;
-        nf_record_t record = random_record(WAYPOINT);
-        lies.gust_cm_s = 200;
-        list.count = 0;
-        add(&record);
-        prepare_with(&flight, true, &lies); /* the list is refused, so it holds */
-        craft.height = 1000;
-        craft.wind = (vector_t){500, 0};
-        flight.in.switch_on = flight.toggled = true;
-        step(&flight);
-        flight.toggled = false;
-        go_on(&flight, 30);
-        flight.in.fix = false;
-        go_on(&flight, 20);
-        CHECK(flight.core.state == NF_NO_FIX || flight.core.state == NF_SINK);
-        speeds += hypot(craft.v.n, craft.v.e) / 100;
-    }
-    return speeds / 20;
-}
-
-static void test_blind(void)
-{
-    CHECK(blind_speed() < 3.3);
 }
 
 static void test_braking(void)
@@ -1117,9 +1018,6 @@ int main(int argc, char **argv)
     test_battery();
     test_margin();
     test_braking();
-    test_old_fixes();
-    test_takeoff_drift();
-    test_blind();
     for (seed = first; seed < first + lists; seed++) {
         chance_state = seed * 0x9E3779B97F4A7C15u + 1;
         if (seed % 4)
