@@ -9,6 +9,7 @@ from typing import Any
 
 from bridge.gcs.ground_station import Sender
 from bridge.missions.list_check import ListCheck
+from bridge.voice.stations import Kind
 from protocols.mission_item import MissionItem
 from reports.verdict import Verdict
 
@@ -102,9 +103,8 @@ class ArrivingList:
 
     If one of the sender's frames was lost since the first item, that may have been the MISSION_COUNT of another list:
     most stations answer the request for an item of the previous list with one of their new list. So all items are
-    requested a second time before the last, and after it if a frame was lost just before it. Mission Planner does
-    not go back, but it begins each list with item 0. The items that were not requested give it away: "Write Fast" sends
-    them in bursts, and "Write" repeats the present item if another is requested.
+    requested a second time before the last, and after it if a frame was lost just before it. Not from Mission Planner:
+    such requests cost most of its ten tries, and it begins each list with item 0, as its unrequested items show.
     """
 
     def __init__(self, count: int, check: ListCheck, now: float) -> None:
@@ -119,7 +119,7 @@ class ArrivingList:
         self._one_until = 0.0
         #: Items 0.._compared-1 were the same the second time, or None if they are not requested again.
         self._compared: int | None = None
-        #: Items that arrived unrequested: new items, or repeats of another than requested a second time.
+        #: Items that arrived unrequested: in bursts ("Write Fast"), or instead of those requested again ("Write").
         self._unrequested = 0
 
     @property
@@ -187,7 +187,7 @@ class ArrivingList:
 
     def _compare(self, sender: Sender) -> None:
         """Begin or end the second reading."""
-        if self._unrequested >= _UNREQUESTED:
+        if sender.station.behaviour.kind is Kind.MISSION_PLANNER or self._unrequested >= _UNREQUESTED:
             self._compared, self._one_until = None, inf
         elif self._compared is None:
             self._compared = self._unrequested = 0

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
@@ -131,6 +132,24 @@ def test_a_list_is_requested_twice_if_a_frame_was_lost() -> None:
     station.on_message.append(lose)
     assert Upload(station, items).run() is A.ACCEPTED
     assert requested(station) == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 5]
+    assert world.stored == records_of(items)
+
+
+def test_mission_planner_is_not_asked_for_its_items_again_after_a_lost_frame() -> None:
+    """A request for another item than the next costs one of its ten tries."""
+    world, station = holding()
+    items = waypoints(6)
+    station.send(messages.MAVLink_request_data_stream_message(1, 1, messages.MAV_DATA_STREAM_ALL, 4, 1))
+    receiving(world, station, items, 4)
+    for _ in range(3):
+        station.pack(item_message(4, items[4]))
+        world.run(0.3)
+    station.send(item_message(4, items[4]))
+    world.run(0.001)
+    assert requested(station) == [4, 4, 4, 5]
+    station.send(item_message(5, items[5]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(items)
 
 
