@@ -1,31 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`make pi-trial`: the package on a whole emulated Raspberry Pi 3, with systemd, a real device tree and its UART.
 
-    python -m deb.pi_trial [--keep]
+    python -m deb.pi_trial [--cuts 100] [--keep]
 
 The board on the header's pins is the simulated Naze with the patch's compiled core, at the speed that the Pi sets; the
 ground station is pymavlink, outside. The Pi is far slower than a real one, so nothing here measures time.
 
 What QEMU cannot show: the ACT LED, radio (Wi-Fi chips, phones, Bluetooth), a real UART's timing, levels and noise, a
-card, undervoltage, heat, and the boot loader (deb/pi_machine.py plays it).
+card that tears or forgets writes, undervoltage, heat, and the boot loader (deb/pi_machine.py plays it).
 """
 
 import argparse
 import json
 import os
+import random
 import re
 import shutil
 import socket
 import subprocess
 import sys
 import time
-from contextlib import AbstractContextManager
+import urllib.request
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
+from http.client import HTTPException
 from pathlib import Path
+from threading import Event, Thread
+from typing import Any
 
 from deb.pi_machine import CACHE, PROJECT, Pi, TrialError, make_card, run
 from protocols.mission_item import MissionItem, MissionResult
-from service.cli.demo import MissionClient, connect
+from service.cli.demo import ClientError, MissionClient, connect
 from terminal.files import load_mission
 
 #: Debian's packages, and a program or file of each. The last is there once the kernel runs arm64's programs with it.
@@ -53,7 +58,7 @@ def check(is_so: object, text: str) -> None:
 
 
 class Naze:
-    """The simulated board."""
+    """The simulated board, which keeps its power while the Pi loses it."""
 
     def __init__(self, folder: Path) -> None:
         self.link, self._control = folder / "naze", folder / "control"
@@ -134,8 +139,74 @@ def arms(pi: Pi, naze: Naze) -> None:
         check(mark_of(gcs.read()) == 31, "the mission is lost after the flight")
 
 
+def survives(pi: Pi, cuts: int, seed: int) -> None:
+    """The plug is pulled during and after uploads, and after saves of settings: it boots, with all acknowledged."""
+    chance = random.Random(seed)
+    marks, sysid, lasted = [31.0], 0, {upload: 20.0, save: 20.0}
+    for turn in range(cuts):
+        act, mark, is_during = (upload, save)[turn % 2], 40 + turn % 200, turn % 4 == 2
+        acknowledged = Event()
+        work = Thread(target=act, args=(pi, mark, acknowledged), daemon=True)
+        begun = time.monotonic()
+        work.start()
+        work.join(chance.uniform(0, lasted[act]) if is_during else None)
+        lasted[act] = lasted[act] if is_during else time.monotonic() - begun
+        pi.cut()
+        is_kept = acknowledged.is_set()
+        work.join()
+        say(f"cut {turn + 1} of {cuts}: {act.__name__}, {'' if is_kept else 'not '}acknowledged")
+        check(is_kept or is_during, f"{act.__name__} {mark} was not acknowledged")
+        pi.start()
+        pi.until(_HAS_BOARD)
+        failed = pi.run("systemctl --failed --plain --no-legend")
+        check(not failed, f"after cut {turn + 1} failed: {failed}")
+        found = int(re.sub(r"\D", "", pi.run("grep ^sysid /etc/naze-bridge/page.toml || true")) or 0)
+        if act is upload:
+            marks += [mark] if is_kept else []
+        else:
+            sysid = mark
+        check(found == sysid, f"after cut {turn + 1} the system id is {found}, not {sysid}")
+        lost = {*marks[-20:]} - marks_on_pi(pi)  # the page lists the newest 50
+        check(not lost, f"after cut {turn + 1} missions {lost} are lost")
+
+
+def upload(pi: Pi, mark: int, acknowledged: Event) -> None:
+    with suppress(ClientError, OSError), station(pi) as gcs:
+        if gcs.write(mission(mark), lambda _: None) is MissionResult.ACCEPTED:
+            acknowledged.set()
+
+
+def save(pi: Pi, mark: int, acknowledged: Event) -> None:
+    """A setting from the status page."""
+    with suppress(OSError, HTTPException, TrialError):
+        token = pi.run("cat /var/lib/naze-bridge/web-token").strip()
+        fetch(pi, "/api/pi", token, {"action": "settings", "values": {"sysid": mark}})
+        while not (job := fetch(pi, "/api/pi", token))["done"]:
+            time.sleep(0.2)
+        if "reply" in job:
+            acknowledged.set()
+
+
+def fetch(pi: Pi, path: str, token: str = "", data: object = None) -> Any:
+    """A request to the status page's API, from outside."""
+    headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+    body = None if data is None else json.dumps(data).encode()
+    request = urllib.request.Request(f"http://127.0.0.1:{pi.ports['page']}{path}", body, headers)
+    with urllib.request.urlopen(request, timeout=60) as reply:  # noqa: S310  # our own address
+        return json.load(reply)
+
+
+def marks_on_pi(pi: Pi) -> set[float]:
+    """The marks of the missions that the Pi has stored and the board has verified."""
+    listed = [each["number"] for each in fetch(pi, "/api/missions")["missions"] if each["outcome"] == "VERIFIED"]
+    rows = [row["left"] for number in listed for row in fetch(pi, f"/api/missions/{number}")["rows"] if row["left"]]
+    return {row["alt_m"] for row in rows if row["seq"] == 2}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cuts", type=int, default=8, help="how often the plug is pulled")
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", action="store_true", help="use the card of the last trial")
     given = parser.parse_args()
     missing = [package for package, path in _NEEDED.items() if not (shutil.which(path) or Path(path).exists())]
@@ -156,6 +227,8 @@ def main() -> None:
         for part in (boots, is_examined, writes, arms):
             say(str(part.__doc__))
             part(pi, naze)
+        say(str(survives.__doc__))
+        survives(pi, given.cuts, given.seed)
         say("passed")
     except TrialError as error:
         sys.exit(f"FAILED: {error}")
