@@ -288,7 +288,10 @@ def test_refused_fence_and_rally_points_keep_their_mission_type(shared: Bench, k
         planner.send(messages.MAVLink_mission_clear_all_message(1, 1, mission_type))
     planner.listen(0.5)
     acks = [(message.type, message.mission_type) for message in planner.messages("MISSION_ACK")]
-    assert acks == [(MissionResult.UNSUPPORTED, 1)] * 3 + [(MissionResult.UNSUPPORTED, 2)] * 3
+    assert acks == [(MissionResult.UNSUPPORTED, 1)] * 2 + [(MissionResult.UNSUPPORTED, 2)] * 2
+    # Mission Planner waits for a count, and takes no refusal of a reading.
+    counts = [(message.count, message.mission_type) for message in planner.messages("MISSION_COUNT")]
+    assert counts == [(0, 1), (0, 2)]
     assert shared.board.records() == kept
 
 

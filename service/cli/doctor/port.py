@@ -22,7 +22,9 @@ _BLUETOOTH = ("hciattach", "btattach")
 
 
 def fc_remedy(port: str, source: str) -> str:
-    """The way to set `fc` so that it takes effect. `source`: where it is set now, "FILE:LINE"; empty: nowhere."""
+    """The way to set `fc` so that it takes effect. `source`: where it is set now: "FILE:LINE", "--fc" or ""."""
+    if source == "--fc":
+        return f"leave --fc out, or give it {port}"
     if not source or SETUP_FILE in source or PAGE_FILE in source:
         return f"sudo naze-bridge setup --fc {port}"
     return f'write fc = "{port}" in {source} (the line decides), then: sudo systemctl restart naze-bridge'

@@ -20,6 +20,7 @@ def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup --fc /dev/ttyUSB0")
+    assert_problem(check_port(pi, PORT, "--fc"), "/dev/serial0 is missing", "leave --fc out, or give it /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
     # There are no further checks of a missing port.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
