@@ -26,7 +26,7 @@ from bridge.vehicle.vehicle_messages import Moment
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from protocols.mavlink.codec import pack
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
 from protocols.msp.mission_flight import SUMMARY
 from protocols.msp.nav import NavStatus
@@ -298,17 +298,16 @@ class OwnVehicle:
             self._ground.say(sentences.FAILSAFE())
         elif was_failsafe and not state.is_failsafe and state.armed:
             self._ground.say(sentences.FAILSAFE_ENDED())
-        self._ground.outbox.multicast(pack(self._heartbeat(now)), self._ground.everyone)
+        self._ground.outbox.multicast(pack(make.heartbeat(self._moment(now))), self._ground.everyone)
 
     def _beat(self, now: float, stations: Sequence[GroundStation]) -> None:
-        heartbeat, for_qgc = self._heartbeat(now), self._heartbeat(now)
+        moment = self._moment(now)
+        heartbeat = for_qgc = make.heartbeat(moment)
         if self.readiness.state.is_lost and self._session.vehicle.armed:
             # An armed craft in CRITICAL is "Flying" there (APMFirmwarePlugin::_handleIncomingHeartbeat).
+            for_qgc = make.heartbeat(moment)
             for_qgc.system_status = messages.MAV_STATE_STANDBY
         self._ground.outbox.beat(heartbeat, for_qgc, self._ground.ids, stations)
-
-    def _heartbeat(self, now: float) -> Message:
-        return make.heartbeat(self._moment(now))
 
     def _follow_mission(self, now: float) -> None:
         """Report reached waypoints and the next one at once, and why a flight has stopped."""
