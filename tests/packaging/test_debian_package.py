@@ -60,15 +60,15 @@ _UNITS = (
     *(f"-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
 )
 #: Every file written since with one of the secrets in it, also as in a key file: name, owner and mode.
-# Not in the repository, below which other tests run meanwhile.
-_SECRETS = f"""
-find / -xdev -path {_REPOSITORY} -prune -o -newer /root/before -type f -size -4M \\
-    -exec grep -lF -e '{{0}}' -e 'correct\\shorse' -e '{{1}}' -e '{{2}}' {{{{}}}} + | xargs -r stat -c '%n %U %a'
+# The overlay's own files, because other programs write to the machine meanwhile.
+_SECRETS = """
+cd /mnt && find . -newer /root/before -type f -size -4M \\
+    -exec grep -lF -e '{0}' -e 'correct\\shorse' -e '{1}' -e '{2}' {{}} + | xargs -r stat -c '%n %U %a'
 """
 _EXPECTED_SECRETS = [
-    "/etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection root 600",
-    "/etc/naze-bridge/gcs.key naze-bridge 600",
-    "/var/lib/private/naze-bridge/web-token naze-bridge 600",
+    "./etc/NetworkManager/system-connections/naze-bridge-hotspot.nmconnection root 600",
+    "./etc/naze-bridge/gcs.key naze-bridge 600",
+    "./var/lib/private/naze-bridge/web-token naze-bridge 600",
 ]
 _LED = "cd /sys/class/leds/ACT && echo -n $(cat trigger delay_on delay_off)"
 _STOP = "kill $(cat /run/pid); while grep -q . /proc/$(cat /run/pid)/cmdline; do sleep 0.1; done"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Debian root to install into: this machine's root under a temporary overlay.
+"""A Debian root to install into: this machine's root under a temporary overlay, whose changes are below /mnt.
 
 It has its own namespaces, so it cannot change the machine, and only a loopback network.
 """
@@ -22,7 +22,8 @@ set -e
 mount -t tmpfs none "$0"; cd "$0"; mkdir upper work root
 mount -t overlay overlay -o lowerdir=/,upperdir=upper,workdir=work root
 rm -f root/var/lib/man-db/auto-update
-mount -t proc proc root/proc; mount --rbind /dev root/dev; mount -t tmpfs none root/run; mount -t tmpfs none root/tmp
+mount -t proc proc root/proc; mount --rbind /dev root/dev; mount --bind upper root/mnt
+mount -t tmpfs none root/run; mount -t tmpfs none root/tmp
 ip link set lo up 2>/dev/null || true
 exec chroot root sh -c 'echo ready; exec cat'
 """
