@@ -1,38 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge fleet`: the commands, and their output."""
 
+import time
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
+from rich.live import Live
+from rich.text import Text
 
-from fleet.conditions import Condition, matching
 from fleet.enroll_command import enroll, expel
 from fleet.logs import fleet_logs
 from fleet.missions import Held, pull
-from fleet.options import (
-    address_options,
-    fleet_session,
-    json_option,
-    vehicle_option,
-    where_option,
-)
+from fleet.options import address_options, fleet_session, json_option, vehicle_option
 from fleet.push_command import push_mission, verify_mission
 from fleet.roll_call import alive, chosen, roll_call
+from fleet.session import FleetError, is_connected
 from fleet.settings import fleet_settings
-from fleet.tables import complaints, fleet_lines, fleet_table
-from fleet.watch import watching
-from fleet.watch_screen import print_changes, show_screen
+from fleet.tables import complaints, fleet_lines, watch_lines
 from protocols.mission_file import MissionFileError, write_qgc_wpl
 from storage.os_error import reason
 from terminal.command_group import PATH, CommandGroup
 from terminal.files import shown_path, write_file
-from terminal.printing import print_json, print_table
+from terminal.printing import console, print_json, print_table
 from terminal.sentences import complain, fail
 
 _STANDARD_OUTPUT = Path("-")
-_MANY = 500
+_WATCH_INTERVAL_S = 2.0
 
 
 @click.group(cls=CommandGroup)
@@ -46,29 +42,23 @@ for _command in (push_mission, verify_mission, fleet_settings, fleet_logs, enrol
 
 @fleet.command("list")
 @address_options
-@where_option
 @click.option("--limit", type=click.IntRange(1), help="The maximum number of vehicles.")
 @json_option
-def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition], **where: Any) -> None:
+def list_vehicles(as_json: bool, limit: int | None, **where: Any) -> None:
     """Show which vehicles are alive, and their state.
 
     Exit code 0 even if there are none; 1: a vehicle or the router does not answer.
     """
     with fleet_session(where) as (session, prefix), fleet_session(where) as (second, _):
-        found = matching(everyone := roll_call(session, prefix, second), conditions)
-    shown, unanswered = found[:limit], sum(not vehicle.answers for vehicle in everyone)
+        everyone = roll_call(session, prefix, second)
+    shown, unanswered = everyone[:limit], sum(not vehicle.answers for vehicle in everyone)
     if as_json:
         counts = {"alive": len(everyone), "unanswered": unanswered}
         print_json({"vehicles": [asdict(vehicle) for vehicle in shown], "complaints": complaints(everyone)} | counts)
     elif shown:
-        if len(shown) > _MANY:
-            click.echo("\n".join(fleet_lines(shown)))
-        else:
-            print_table(fleet_table(shown))
-        if len(shown) < len(found):
-            click.echo(f"and {len(found) - len(shown):,} more")
-    elif everyone:
-        click.echo(f"None of the {len(everyone) - unanswered:,} vehicles that answered matches.")
+        click.echo("\n".join(fleet_lines(shown)))
+        if len(shown) < len(everyone):
+            click.echo(f"and {len(everyone) - len(shown):,} more")
     else:
         click.echo(f"No vehicle is alive under {prefix!r}.")
     for line in () if as_json else complaints(everyone):
@@ -79,22 +69,23 @@ def list_vehicles(as_json: bool, limit: int | None, conditions: list[Condition],
 
 @fleet.command(short_help="Show which vehicles are alive, until Ctrl-C.")
 @address_options
-@where_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each change.")
-def watch(as_json: bool, conditions: list[Condition], **where: Any) -> None:
+def watch(**where: Any) -> None:
     """Show which vehicles are alive and their state, until Ctrl-C: armed ones and problems first."""
     with (
         fleet_session(where) as (session, prefix),
-        fleet_session(where) as (roll, _),
-        watching(session, roll, prefix) as seen,
+        fleet_session(where) as (second, _),
+        suppress(KeyboardInterrupt),
+        Live(console=console(), auto_refresh=False, vertical_overflow="crop") as live,
     ):
-        try:
-            if as_json:
-                print_changes(seen, conditions)
-            else:
-                show_screen(seen, session, conditions)
-        except KeyboardInterrupt:
-            return
+        while True:
+            lines = ["The router is gone; waiting for it."]
+            try:
+                if is_connected(session):
+                    lines = watch_lines(roll_call(session, prefix, second))
+            except FleetError as error:
+                lines = [str(error)]
+            live.update(Text("\n".join(["Ctrl-C ends.", *lines]), no_wrap=True), refresh=True)
+            time.sleep(_WATCH_INTERVAL_S)
 
 
 @fleet.command("pull", short_help="Read the missions of vehicles' flight controllers.")

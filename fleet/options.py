@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 import click
 import zenoh
 
-from fleet.conditions import FIELDS, parse_condition
 from fleet.session import DEFAULT_ENDPOINT, FleetError, open_session
 from payloads.names import DEFAULT_PREFIX, ZenohSettingsError, check_name
 from terminal.command_group import PATH
@@ -50,27 +49,9 @@ vehicle_option = click.option(
 all_option = click.option("--all", "to_all", is_flag=True, help="Every vehicle that is alive.")
 
 
-def _conditions(_context: click.Context, _option: click.Parameter, texts: tuple[str, ...]) -> list[Any]:
-    try:
-        return [parse_condition(text) for text in texts]
-    except ValueError as error:
-        raise click.BadParameter(str(error)) from None
-
-
-where_option = click.option(
-    "--where",
-    "conditions",
-    metavar="CONDITION",
-    multiple=True,
-    callback=_conditions,
-    help=f"Only vehicles that match, as in armed=true, battery_v<10.5 or name=kite*; several must all match. "
-    f"Fields: {', '.join(FIELDS)}.",
-)
-
-
 def vehicles_options(command: F) -> F:
-    """--vehicle, --all and --where."""
-    return vehicle_option(all_option(where_option(command)))
+    """--vehicle and --all."""
+    return vehicle_option(all_option(command))
 
 
 staged_option = click.option(

@@ -8,7 +8,6 @@ from typing import Any
 import click
 import zenoh
 
-from fleet.conditions import Condition, matching
 from fleet.missions import Trial, try_mission
 from fleet.options import (
     address_options,
@@ -18,18 +17,15 @@ from fleet.options import (
     vehicles_options,
 )
 from fleet.push import FleetPush, push
-from fleet.roll_call import alive, chosen, roll_call
-from fleet.session import FleetError
+from fleet.roll_call import alive, chosen
 from fleet.tables import (
     dry_run_table,
-    in_few_words,
     push_bars,
     push_data,
     push_summary,
     push_table,
     verify_table,
 )
-from fleet.vehicle import BridgeId
 from payloads.keys import UPLOAD, ZenohKey
 from protocols.mission_file import MissionFileError, read_mission_file
 from terminal.command_group import PATH
@@ -67,7 +63,6 @@ def push_mission(
     file: Path,
     names: tuple[str, ...],
     to_all: bool,
-    conditions: list[Condition],
     staged: bool,
     dry_run: bool,
     as_json: bool,
@@ -81,9 +76,10 @@ def push_mission(
     require_choice(names, to_all)
     mission, item_count = _read(file)
     with fleet_session(where) as (session, prefix):
-        bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
+        bridges = alive(session, prefix)
+        meant = chosen(bridges, names, prefix)
         if dry_run:
-            _show_trials(try_mission(session, prefix, meant, bridges, mission), unknown, as_json)
+            _show_trials(try_mission(session, prefix, meant, bridges, mission), as_json)
             return
         delivery = FleetPush(meant)
         if staged:
@@ -92,7 +88,8 @@ def push_mission(
                 if trial.is_held:
                     delivery.held(trial.vehicle, f"Mission held already: {trial.count} records")
         has_failed = push_file(session, prefix, delivery, mission, item_count, _MISSION, staged=staged, as_json=as_json)
-    end(unknown, is_bad=has_failed)
+    if has_failed:
+        raise SystemExit(1)
 
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
@@ -100,9 +97,7 @@ def push_mission(
 @vehicles_options
 @address_options
 @json_option
-def verify_mission(
-    file: Path, names: tuple[str, ...], to_all: bool, conditions: list[Condition], as_json: bool, **where: Any
-) -> None:
+def verify_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bool, **where: Any) -> None:
     """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
 
     Exit code 1: one does not hold it, or did not answer.
@@ -110,7 +105,8 @@ def verify_mission(
     require_choice(names, to_all)
     mission, _ = _read(file)
     with fleet_session(where) as (session, prefix):
-        bridges, meant, unknown = vehicles_meant(session, prefix, names, conditions)
+        bridges = alive(session, prefix)
+        meant = chosen(bridges, names, prefix)
         trials = try_mission(session, prefix, meant, bridges, mission)
     held = sum(trial.is_held is True for trial in trials)
     if as_json:
@@ -118,7 +114,8 @@ def verify_mission(
     else:
         print_table(verify_table(trials))
         click.echo(f"{held} of {len(trials)} vehicles hold the mission")
-    end(unknown, is_bad=held < len(trials))
+    if held < len(trials):
+        raise SystemExit(1)
 
 
 def _read(file: Path) -> tuple[bytes, int]:
@@ -163,36 +160,12 @@ def push_file(
     return bool(delivery.failed)
 
 
-def vehicles_meant(
-    session: zenoh.Session, prefix: str, names: tuple[str, ...], conditions: list[Condition]
-) -> tuple[set[BridgeId], list[str], str]:
-    """All bridges, the names of the vehicles meant, and a sentence about those that may match but did not answer."""
-    bridges = alive(session, prefix)
-    found = chosen(bridges, names, prefix)
-    if not conditions:
-        return bridges, found, ""
-    listed = [vehicle for vehicle in roll_call(session, prefix) if vehicle.name in found]
-    like = {vehicle.name for vehicle in matching(listed, conditions)}
-    silent = [vehicle.name for vehicle in listed if not vehicle.answers and vehicle.name not in like]
-    unknown = f"{len(silent)} of {len(found)} vehicles did not answer: {in_few_words(silent)}" if silent else ""
-    if not like:
-        raise FleetError(f"none of the vehicles that answered matches; {unknown}".removesuffix("; "))
-    return bridges, [name for name in found if name in like], unknown
-
-
-def _show_trials(trials: list[Trial], unknown: str, as_json: bool) -> None:
+def _show_trials(trials: list[Trial], as_json: bool) -> None:
     failed = sum(trial.error is not None for trial in trials)
     if as_json:
         print_json({"vehicles": [asdict(each) for each in trials], "failed": failed})
     else:
         print_table(dry_run_table(trials))
         click.echo(f"{len(trials) - failed} of {len(trials)} vehicles would accept the mission; nothing was written")
-    end(unknown, is_bad=failed > 0)
-
-
-def end(unknown: str, *, is_bad: bool) -> None:
-    """Exit code 1 if something failed, or if it is not known which vehicles were meant."""
-    if unknown:
-        complain(unknown)
-    if is_bad or unknown:
+    if failed:
         raise SystemExit(1)

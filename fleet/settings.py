@@ -11,11 +11,10 @@ import zenoh
 from rich.table import Column, Table
 from rich.text import Text
 
-from fleet.conditions import Condition
 from fleet.options import address_options, fleet_session, json_option, staged_option, vehicle_option, vehicles_options
 from fleet.payload import part, text
 from fleet.push import FleetPush
-from fleet.push_command import Pushed, end, push_file, require_choice, vehicles_meant
+from fleet.push_command import Pushed, push_file, require_choice
 from fleet.roll_call import alive, chosen
 from fleet.session import NO_COMMANDS, NOT_UNDERSTOOD, answer_of, ask_each
 from fleet.tables import in_few_words
@@ -170,7 +169,6 @@ def restore_settings(
     file: Path,
     names: tuple[str, ...],
     to_all: bool,
-    conditions: list[Condition],
     staged: bool,
     dry_run: bool,
     as_json: bool,
@@ -184,14 +182,15 @@ def restore_settings(
     require_choice(names, to_all)
     data, count = _read(file)
     with fleet_session(where) as (session, prefix):
-        _, found, unknown = vehicles_meant(session, prefix, names, conditions)
+        found = chosen(alive(session, prefix), names, prefix)
         if dry_run:
-            _show_trials(try_settings(session, prefix, found, data), unknown, as_json)
+            _show_trials(try_settings(session, prefix, found, data), as_json)
             return
         has_failed = push_file(
             session, prefix, FleetPush(found), data, count, _SETTINGS, staged=staged, as_json=as_json
         )
-    end(unknown, is_bad=has_failed)
+    if has_failed:
+        raise SystemExit(1)
 
 
 def _read(file: Path) -> tuple[bytes, int]:
@@ -202,7 +201,7 @@ def _read(file: Path) -> tuple[bytes, int]:
         fail(error, UNREADABLE)
 
 
-def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> None:
+def _show_trials(trials: list[SettingsTrial], as_json: bool) -> None:
     cannot = [trial for trial in trials if trial.plan is None or trial.plan.get("left_out")]
     if as_json:
         print_json({"vehicles": [asdict(trial) for trial in trials], "failed": len(cannot)})
@@ -214,7 +213,8 @@ def _show_trials(trials: list[SettingsTrial], unknown: str, as_json: bool) -> No
         click.echo(
             f"{len(trials) - len(cannot)} of {len(trials)} vehicles could take all settings; nothing was written"
         )
-    end(unknown, is_bad=bool(cannot))
+    if cannot:
+        raise SystemExit(1)
 
 
 def _summary(trial: SettingsTrial) -> tuple[str, str]:

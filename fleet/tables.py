@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fleet, and the progress and result of a push to it, as tables for a terminal."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
@@ -27,9 +27,11 @@ _ANSWERS = {
 
 
 #: Titles of columns whose cells are aligned to the right, and of those that may take several lines.
-_NUMBERS = ("Battery", "Latitude", "Longitude", "Height", "Heard", "Records")
+_NUMBERS = ("Battery", "Latitude", "Longitude", "Height", "Records")
 _FOLDED = ("Vehicle", "Details")
 _LISTED = ("Vehicle", "Speaks", "Armed", "Battery", "Latitude", "Longitude", "Height", "Mission")
+_WATCHED = ("Vehicle", "Armed", "Battery", "Height", "Mission", "Problem, or mode")
+_LINKED = ("MSP", "MAVLink")
 
 
 def _table(*titles: str, caption: Text | None = None) -> Table:
@@ -40,33 +42,32 @@ def _table(*titles: str, caption: Text | None = None) -> Table:
     return table
 
 
-def watch_table(rows: Sequence[tuple[FleetVehicle, float | None, str]]) -> Table:
-    """One row per bridge, each on one line of 80 columns: vehicle, age of the state, problem."""
-    table = _table("Vehicle", "Armed", "Battery", "Height", "Mission", "Heard", "Problem, or mode")
-    for column in (table.columns[0], table.columns[-1]):
-        column.no_wrap, column.overflow, column.max_width = True, "ellipsis", 20
-    for vehicle, age_s, problem in rows:
-        name, _, armed, battery, _, _, height, mission = _cells(vehicle)
-        age = Text(_UNKNOWN if age_s is None else f"{age_s:.0f} s")
-        last = Text(problem, style="yellow") if problem else Text(vehicle.mode or _UNKNOWN)
-        table.add_row(name, armed, battery, height, mission, age, last)
-    return table
+def watch_lines(fleet: Iterable[FleetVehicle]) -> list[str]:
+    """Counts, then the armed vehicles, those with problems, and the others, each by name."""
+    rows = sorted(fleet, key=lambda vehicle: (not vehicle.armed, not _problem(vehicle)))
+    if not rows:
+        return ["No vehicle is alive."]
+    armed, troubled = sum(vehicle.armed is True for vehicle in rows), sum(bool(_problem(vehicle)) for vehicle in rows)
+    return [f"{len(rows):,} vehicles, {armed:,} armed, {troubled:,} with problems", "", *fleet_lines(rows, _WATCHED)]
 
 
-def fleet_table(fleet: Sequence[FleetVehicle]) -> Table:
-    table = _table(*_LISTED)
-    for vehicle in fleet:
-        table.add_row(*_cells(vehicle))
-    return table
+def _problem(vehicle: FleetVehicle) -> str:
+    """The reason why it needs attention, or empty."""
+    if vehicle.bridges > 1:
+        return f"{vehicle.bridges} bridges use this name"
+    if not vehicle.answers:
+        return "does not answer"
+    return "" if vehicle.protocol in _LINKED else "no flight controller"
 
 
-def fleet_lines(fleet: Sequence[FleetVehicle]) -> Iterator[str]:
-    """The same table for thousands of vehicles, which a Table would take seconds for."""
-    rows = [list(_LISTED), *([cell.plain for cell in _cells(vehicle)] for vehicle in fleet)]
+def fleet_lines(fleet: Sequence[FleetVehicle], titles: Sequence[str] = _LISTED) -> Iterator[str]:
+    """A line for each vehicle. A Table of thousands would take seconds."""
+    cells = map(_cells, fleet)
+    rows = [list(titles), *([known[title] for title in titles] for known in cells)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
-        cells = zip(_LISTED, row, widths, strict=True)
-        aligned = (cell.rjust(width) if title in _NUMBERS else cell.ljust(width) for title, cell, width in cells)
+        placed = zip(titles, row, widths, strict=True)
+        aligned = (cell.rjust(width) if title in _NUMBERS else cell.ljust(width) for title, cell, width in placed)
         yield " ".join(aligned).rstrip()
 
 
@@ -89,25 +90,26 @@ def in_few_words(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + ", ..." * (len(names) > _NAMED)
 
 
-def _cells(vehicle: FleetVehicle) -> list[Text]:
-    armed = {True: Text("ARMED", style="bold red"), False: Text("no"), None: Text(_UNKNOWN)}[vehicle.armed]
+def _cells(vehicle: FleetVehicle) -> dict[str, str]:
+    """By title."""
     mission = _UNKNOWN
     if vehicle.mission_count is not None:
         mission = f"{vehicle.mission_count:3} {vehicle.mission_checksum}" if vehicle.mission_count else "none"
-    return [
-        Text(vehicle.name),
-        Text(vehicle.protocol or _UNKNOWN),
-        armed,
-        _number(vehicle.battery_v, ".1f", " V"),
-        _number(vehicle.lat_deg, ".5f"),
-        _number(vehicle.lon_deg, ".5f"),
-        _number(vehicle.height_m, ".0f", " m"),
-        Text(mission),
-    ]
+    return {
+        "Vehicle": vehicle.name,
+        "Speaks": vehicle.protocol or _UNKNOWN,
+        "Armed": {True: "ARMED", False: "no", None: _UNKNOWN}[vehicle.armed],
+        "Battery": _number(vehicle.battery_v, ".1f", " V"),
+        "Latitude": _number(vehicle.lat_deg, ".5f"),
+        "Longitude": _number(vehicle.lon_deg, ".5f"),
+        "Height": _number(vehicle.height_m, ".0f", " m"),
+        "Mission": mission,
+        "Problem, or mode": _problem(vehicle) or vehicle.mode or _UNKNOWN,
+    }
 
 
-def _number(value: float | None, form: str, unit: str = "") -> Text:
-    return Text(_UNKNOWN if value is None else f"{value:{form}}{unit}")
+def _number(value: float | None, form: str, unit: str = "") -> str:
+    return _UNKNOWN if value is None else f"{value:{form}}{unit}"
 
 
 @contextmanager

@@ -24,7 +24,7 @@ NOT_RUN = {
     "naze-bridge card": "needs a card: tests/service/cli/test_card.py runs it",
     "naze-bridge demo": "tests/service/cli/test_demo.py runs it",
     "naze-bridge fleet list": "needs a router: tests/fleet/test_command.py runs it",
-    "naze-bridge fleet watch": "needs a router: tests/fleet/test_watch_screen.py runs it",
+    "naze-bridge fleet watch": "needs a router: tests/fleet/test_roll_call.py runs it",
     "naze-bridge fleet push": "needs a router: tests/fleet/test_push.py runs it",
     "naze-bridge settings get MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",
     "naze-bridge settings set MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",

@@ -9,7 +9,6 @@ from pathlib import Path
 import click
 import pytest
 
-from fleet.conditions import parse_condition
 from service.cli.main import main
 from service.settings import Settings, load_settings
 from service.settings.addresses import parse_gcs
@@ -81,5 +80,3 @@ def test_an_option_in_the_text_exists(span: str, place: str) -> None:
     assert option.partition("=")[0] in {*options(main), "--json"} | OTHER_PROGRAMS, place
     if option == "--gcs" and value:
         parse_gcs(value.replace("ADDRESS", "192.168.4.20"))
-    if option == "--where" and value != "CONDITION":
-        parse_condition(value.strip("'"))

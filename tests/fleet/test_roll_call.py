@@ -169,17 +169,8 @@ def test_a_hung_bridge_is_listed_as_silent(fleet: Fleet) -> None:
         assert (vehicles["kite"]["answers"], vehicles["snail"]["answers"]) == (False, True)
         listed = fleet.ask("list")
         assert (listed.returncode, "1 of 2 vehicles are alive, but did not answer: kite" in listed.stderr) == (1, True)
-        listed = fleet.ask("list", "--where", "armed=true")
-        assert (listed.returncode, "None of the 1 vehicles that answered matches." in listed.stdout) == (1, True)
         counts = json.loads(fleet.ask("list", "--json").stdout)
         assert (counts["alive"], counts["unanswered"]) == (2, 1)
-        file = fleet.folder / "short.waypoints"
-        file.write_text(plan_text(plain_plan(5)))
-        pushed = fleet.ask("push", file, "--all", "--where", "armed=true", "--dry-run")
-        assert (pushed.returncode, "1 of 2 vehicles did not answer: kite" in pushed.stderr) == (1, True)
-        pushed = fleet.ask("push", file, "--all", "--where", "armed=false", "--dry-run")
-        assert "1 of 1 vehicles would accept the mission" in pushed.stdout
-        assert (pushed.returncode, "1 of 2 vehicles did not answer: kite" in pushed.stderr) == (1, True)
     finally:
         kite.send_signal(signal.SIGCONT)
     fleet.wait("kite", "snail")
@@ -210,7 +201,7 @@ class Terminal:
 
     @property
     def newest(self) -> str:
-        return (self.text.split("Ctrl-C ends.")[-2:] or [""])[0]
+        return self.text.rpartition("Ctrl-C ends.")[2]
 
     def shows(self, text: str) -> None:
         """Wait until the text is shown after the present output."""

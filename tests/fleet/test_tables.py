@@ -1,19 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables of a fleet: problems of a vehicle are named, and a summary counts every one."""
 
-import io
-
-from rich.console import Console
-
-from fleet.tables import complaints, fleet_lines, fleet_table
+from fleet.tables import complaints, fleet_lines, watch_lines
 from fleet.vehicle import FleetVehicle, as_fleet
-
-
-def shown(table: object) -> str:
-    console = Console(file=io.StringIO(), width=100)
-    console.print(table)
-    assert isinstance(console.file, io.StringIO)
-    return console.file.getvalue()
 
 
 def test_problems_are_named_once_for_each_name() -> None:
@@ -25,7 +14,7 @@ def test_problems_are_named_once_for_each_name() -> None:
             FleetVehicle("owl", "4"),
         ]
     )
-    text = shown(fleet_table(fleet))
+    text = "\n".join(fleet_lines(fleet))
     assert text.index("naze-2 ") < text.index("naze-10")
     assert "11.1" in text
     assert [line.partition(":")[0] for line in complaints(fleet)] == [
@@ -43,3 +32,21 @@ def test_thousands_of_vehicles_are_listed_in_columns() -> None:
         title.index("Armed"),
         title.index("Speaks"),
     ]
+
+
+def test_watch_has_armed_vehicles_first_then_those_with_problems() -> None:
+    fleet = as_fleet(
+        [
+            FleetVehicle("fine", "1", True, protocol="MSP", armed=False, mode="MANUAL"),
+            FleetVehicle("flown", "2", True, protocol="MSP", armed=True, mode="AUTO"),
+            FleetVehicle("lost", "3", True, protocol="searching"),
+            FleetVehicle("mute", "4"),
+            *(FleetVehicle("twin", each, True, protocol="MSP") for each in "56"),
+        ]
+    )
+    head, _, _, *rows = watch_lines(fleet)
+    assert head == "6 vehicles, 1 armed, 4 with problems"
+    assert [row.split()[0] for row in rows] == ["flown", "lost", "mute", "twin", "twin", "fine"]
+    ends = ["AUTO", "no flight controller", "does not answer", *["2 bridges use this name"] * 2, "MANUAL"]
+    assert [row.endswith(end) for row, end in zip(rows, ends, strict=True)] == [True] * 6
+    assert max(map(len, watch_lines(fleet))) <= 80

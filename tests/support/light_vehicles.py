@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Thousands of vehicles as `fleet watch` and `list` see them, in one process.
+"""Thousands of vehicles as `fleet list` sees them, in one process.
 
 `python -m tests.support.light_vehicles ENDPOINT COUNT PERIOD [SILENT]`: a few sessions stand for all. For each vehicle
 they declare a liveliness token and a publisher, send its overview every PERIOD seconds, and answer the query; the last
