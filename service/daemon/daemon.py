@@ -98,7 +98,7 @@ class GcsConnections:
         self.add(open_link(address, self))
 
     def warn(self, address: GcsAddress) -> None:
-        if not address.is_serial:
+        if address.is_public:
             _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
 
     def add(self, link: GcsLink) -> None:

@@ -24,6 +24,8 @@ SETTINGS_REQUESTS = frozenset(
 )
 _MOST_LISTED = 300
 _LONGEST_NAME = 64
+#: A mode without a range.
+_NO_TEXT = "none"
 T = TypeVar("T")
 Progress = Callable[[Json], None]
 
@@ -115,7 +117,8 @@ class SettingsApi:
         if after.value == setting.value:
             text = f"{setting.name} is {_shown(after)} already"
         else:
-            text = f"{setting.name} changed from {_shown(setting)} to {_shown(after)}; not saved yet"
+            was, now = _shown(setting) or _NO_TEXT, _shown(after) or _NO_TEXT
+            text = f"{setting.name} changed from {was} to {now}; not saved yet"
         return _data(after) | {"was": setting.value, "text": text}
 
     async def _answer(self, start: Callable[[Callable[[T | SettingRefusal, float], None], float], None]) -> T:

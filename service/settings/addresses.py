@@ -83,6 +83,11 @@ class GcsAddress:
     def is_serial(self) -> bool:
         return self.kind == "serial"
 
+    @property
+    def is_public(self) -> bool:
+        """True if other machines may reach it: not a radio, and not this machine's own address."""
+        return not self.is_serial and not self.host.startswith(("127.", "::1", "localhost"))
+
     def __str__(self) -> str:
         return f"{self.host},{self.port}" if self.is_serial else f"{self.kind}:{host_port(self.host, self.port)}"
 

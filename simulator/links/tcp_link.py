@@ -2,6 +2,7 @@
 """A simulated board on a TCP port, like INAV's own simulator and Wi-Fi serial adapters."""
 
 import asyncio
+import os
 import socket
 from collections import deque
 from collections.abc import Callable
@@ -69,7 +70,9 @@ class SimTcpLink:
         try:
             self._listener = socket.create_server(self._address)
         except OSError as error:
-            raise PlugError(f"{host}:{port} cannot be opened for listening: {error.strerror}") from error
+            # socket's own text repeats the address. getaddrinfo's errors have numbers below 0.
+            why = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
+            raise PlugError(f"{host}:{port} cannot be opened for listening: {why}; give another port") from error
         self._listener.setblocking(False)
         self._loop.add_reader(self._listener, self._on_connection, self._listener)
 

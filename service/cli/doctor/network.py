@@ -19,7 +19,6 @@ from service.settings.zenoh import ZenohSettings
 
 #: The state of listening sockets in /proc/net/tcp.
 _LISTENS = "0A"
-_LOOPBACK = ("127.", "::1", "localhost")
 
 
 def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
@@ -126,7 +125,7 @@ def check_keys(gcs: Sequence[GcsAddress], access_by_link: Mapping[str, WriteAcce
     """Check that the links have keys that cannot be guessed, or a list of writers."""
     for link in gcs:
         access = access_by_link.get(str(link), WriteAccess())
-        if access.is_open and link.kind not in ("udpout", "serial") and not link.host.startswith(_LOOPBACK):
+        if access.is_open and link.kind != "udpout" and link.is_public:
             found = f"{link}: anyone on this network can change missions and settings"
             yield note("key", found, "sudo naze-bridge setup --new-key makes a key that changes need, and shows it")
         elif access.weak_key is not None:

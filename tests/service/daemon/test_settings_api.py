@@ -51,3 +51,15 @@ def test_a_backup_has_the_difference_from_the_previous_backup(start: Starter) ->
         "p_roll": (35, 44),
         "i_roll": (30, 31),
     }
+
+
+def test_an_emptied_mode_range_reads_none(start: Starter) -> None:
+    link = start.directory / "inav"
+    start.program("inav", "sim", "--kind", "inav", "--link", str(link))
+    daemon = start.daemon(str(link))
+    daemon.wait()
+    texts = [
+        daemon.ask({"do": "set-setting", "name": "MODE_HORIZON", "value": value})["text"]
+        for value in ("AUX2 1300-1700", "")
+    ]
+    assert texts[1] == "MODE_HORIZON changed from AUX2 1300-1700 to none; not saved yet"

@@ -173,3 +173,10 @@ def test_an_invalid_option_is_reported_in_one_sentence(options: tuple[str, ...],
     assert ended.returncode != 0
     assert says in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_a_port_in_use_is_named_with_the_remedy(start: Callable[..., Simulator]) -> None:
+    first = start("--kind", "inav")
+    second = run_naze_bridge("sim", "--kind", "inav", "--tcp", f"127.0.0.1:{first.port}")
+    why = f"127.0.0.1:{first.port} cannot be opened for listening: Address already in use; give another port"
+    assert (second.returncode, second.stderr) == (1, f"naze-bridge: {why}\n")
