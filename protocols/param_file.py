@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from protocols.float32 import is_single
 from protocols.plain_text import FileError, PlainText, file_text, plain_text, shown
+from protocols.remedies import Fault
 
 _NAME = re.compile(r"[!$-+\--~]{1,64}")
 # float() also accepts underscores and digits of any script.
@@ -59,14 +60,14 @@ def read_param_file(data: bytes, name: str) -> ParamFile:
             continue
         setting, value = _setting(fields, line, name, f"line {number}")
         if (first := seen_at.setdefault(setting, number)) != number and values[setting] != value:
-            what = f"{setting} is {shown_value(values[setting])} in line {first} and {shown_value(value)} here"
-            raise ParamFileError(name, f"line {number}", what, "delete one of the lines")
+            former, present = shown_value(values[setting]), shown_value(value)
+            fault = Fault.TWO_VALUES(name=setting, first=former, line=first, second=present)
+            raise ParamFileError(name, f"line {number}", *fault)
         values[setting] = value
         if len(values) > MOST_SETTINGS:
-            what = f"the file has over {MOST_SETTINGS} settings, more than any flight controller"
-            raise ParamFileError(name, f"line {number}", what, "give the settings of one board")
+            raise ParamFileError(name, f"line {number}", *Fault.MANY_SETTINGS(most=MOST_SETTINGS))
     if not values:
-        raise ParamFileError(name, "", "the file has no settings", "save it again")
+        raise ParamFileError(name, "", *Fault.NO_SETTINGS())
     return ParamFile(values, board)
 
 
@@ -121,17 +122,16 @@ def _setting(fields: list[str], line: str, name: str, where: str) -> tuple[str, 
     if len(fields) == _QGC_FIELDS and all(field.isdecimal() for field in (*fields[:2], fields[4])):
         fields = fields[2:4]
     if len(fields) != 2 and (line.startswith((_MISSION, *_STRANGERS)) or "\0" in line):
-        what = "a mission" if line.startswith(_MISSION) else "no settings"
-        raise ParamFileError(name, where, f"this file holds {what}", "give a .param file or a dump (`diff all`)")
+        fault = Fault.MISSION_FOR_SETTINGS if line.startswith(_MISSION) else Fault.NO_SETTINGS
+        raise ParamFileError(name, where, *fault())
     if len(fields) != 2:
-        remedy = "write NAME,VALUE, with a decimal point"
-        raise ParamFileError(name, where, f"{shown(line)} is not a name and a value", remedy)
+        raise ParamFileError(name, where, *Fault.NOT_A_SETTING(line=shown(line)))
     setting, number = fields
     if not is_setting_name(setting):
-        raise ParamFileError(name, where, f"{shown(setting)} is not a setting's name", "write NAME,VALUE")
+        raise ParamFileError(name, where, *Fault.NOT_A_NAME(name=shown(setting)))
     if line.startswith(_TEXT):
         return setting, plain_text(number)
     value = float(number) if _NUMBER.fullmatch(number) else math.nan
     if not math.isfinite(value):
-        raise ParamFileError(name, where, f"{setting} is {shown(number)}, not a number", "write NAME,VALUE")
+        raise ParamFileError(name, where, *Fault.NOT_A_VALUE(name=setting, value=shown(number)))
     return setting, value

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from protocols.msp.inav_places import Safehome
 from protocols.param_file import BOARD, MOST_SETTINGS, ParamFileError, read_param_file
 from protocols.plain_text import file_text, plain_text, shown
+from protocols.remedies import Fault
 
 _SET = re.compile(r"(?:set\s+)?(\w+)\s*=(.*)", re.ASCII | re.IGNORECASE)
 _SAFEHOME = re.compile(r"safehome\s+(\d{1,9})\s+([01])\s+(-?\d{1,10})\s+(-?\d{1,10})", re.ASCII | re.IGNORECASE)
@@ -60,7 +61,7 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
     first: dict[str, str] = {}
     selected: dict[str, str] = {}
     if len(data) > _MAX_SIZE:
-        raise ParamFileError(name, "", "the file is longer than 1 MB", "give the settings of one board")
+        raise ParamFileError(name, "", *Fault.LONG_SETTINGS())
     for number, line in enumerate(file_text(data).splitlines(), start=1):
         command = line.strip()
         if found := _SET.fullmatch(command):
@@ -71,8 +72,8 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
             place, enabled, lat_e7, lon_e7 = map(int, found.groups())
             safehomes.append(Safehome(place, bool(enabled), lat_e7, lon_e7))
         elif found := _COMMAND.match(command):
-            remedy = f"write {_FORMS[found[1].lower()]}"
-            raise ParamFileError(name, f"line {number}", f"{shown(command)} cannot be read", remedy)
+            fault = Fault.BAD_COMMAND(line=shown(command), form=_FORMS[found[1].lower()])
+            raise ParamFileError(name, f"line {number}", *fault)
         elif found := _PROFILE.fullmatch(command):
             profile = found[1].lower(), found[2]
             selected[profile[0]] = profile[1]
@@ -88,8 +89,7 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
     chosen = first | selected
     values = {line.name: line.value for line in lines if chosen[line.profile[0]] == line.profile[1]}
     if len(values) > MOST_SETTINGS:
-        what = f"the file has over {MOST_SETTINGS} settings, more than any flight controller"
-        raise ParamFileError(name, "", what, "give the settings of one board")
+        raise ParamFileError(name, "", *Fault.MANY_SETTINGS(most=MOST_SETTINGS))
     unread += [(line.number, " ".join(line.profile)) for line in lines if chosen[line.profile[0]] != line.profile[1]]
     return SavedSettings(values, tuple(safehomes), board, tuple(sorted(unread)))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from protocols.mission_file import MissionFileError, read_mission_file
 from protocols.mission_item import MissionItem
 from protocols.plain_text import FileError, plain_text
+from protocols.remedies import Fault
 from storage.os_error import reason
 from storage.small_files import read_bounded, replace_file
 from terminal.sentences import complain
@@ -58,7 +59,7 @@ def write_file(path: Path, text: str, failure: type[FileError]) -> None:
     try:
         target = Path(os.path.realpath(path))  # still a link if it leads to itself
         if target.is_symlink() or (target.exists() and not target.is_file()):
-            raise failure(shown_path(path), "", "it is not a regular file", "name another file")
+            raise failure(shown_path(path), "", *Fault.NO_FILE())
         replace_file(target, text.encode(), 0o644)
     except (OSError, ValueError) as error:
         raise _failed(path, error, failure) from None
@@ -66,5 +67,5 @@ def write_file(path: Path, text: str, failure: type[FileError]) -> None:
 
 def _failed(path: Path, error: OSError | ValueError, failure: type[FileError]) -> FileError:
     is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-    remedy = "delete other files there" if is_full else "check the path and its permissions"
-    return failure(shown_path(path), "", reason(error), remedy)
+    fault = Fault.FULL_DISK if is_full else Fault.UNREADABLE_FILE
+    return failure(shown_path(path), "", *fault(why=reason(error)))

@@ -11,6 +11,7 @@ from protocols.mission_file.qgc_plan import read_qgc_plan, write_qgc_plan
 from protocols.mission_file.qgc_wpl import has_header, read_qgc_wpl, write_qgc_wpl
 from protocols.mission_item import MissionItem
 from protocols.plain_text import file_text, plain_text
+from protocols.remedies import Fault
 
 __all__ = ["MissionFileError", "read_mission_file", "write_mission_file", "write_qgc_wpl"]
 
@@ -25,8 +26,7 @@ def write_mission_file(items: Sequence[MissionItem], name: str) -> str:
     """
     ending = PurePath(name).suffix.lower()
     if ending in _FOREIGN:
-        what = f"a mission read from the board cannot be written as {ending}"
-        raise MissionFileError(name, "", what, "name the file .waypoints or .plan")
+        raise MissionFileError(name, "", *Fault.FOREIGN_ENDING(ending=ending))
     return write_qgc_plan(items) if ending == ".plan" else write_qgc_wpl(items)
 
 
@@ -67,5 +67,4 @@ def _read_xml(text: str, name: str, note: Note, alt_m: float | None) -> list[Mis
             return read_kml(root, name, note, alt_m)
         case "gpx":
             return read_gpx(root, name, note, alt_m)
-    remedy = "give a mission of INAV Configurator or mwp, a KML or a GPX"
-    raise MissionFileError(name, "", f"this XML holds <{plain_text(root.tag)[:24]}>", remedy)
+    raise MissionFileError(name, "", *Fault.UNKNOWN_XML(tag=plain_text(root.tag)[:24]))

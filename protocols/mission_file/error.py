@@ -11,6 +11,7 @@ from typing import NoReturn
 
 from protocols.mission_item import degrees_to_e7
 from protocols.plain_text import FileError, shown
+from protocols.remedies import Fault
 
 
 class MissionFileError(FileError):
@@ -33,9 +34,7 @@ def refuse_other_plans(commands: Iterable[int], name: str) -> None:
     """Refuse a list of fence or rally points, which Mission Planner and QGroundControl store in the same formats."""
     kinds = {_OTHER_PLANS.get(command, "") for command in commands}
     if kinds and "" not in kinds:
-        raise MissionFileError(
-            name, "", f"this file holds {' and '.join(sorted(kinds))}", "give the mission's own file"
-        )
+        raise MissionFileError(name, "", *Fault.OTHER_PLAN(kinds=" and ".join(sorted(kinds))))
 
 
 def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int | None:
@@ -45,25 +44,20 @@ def file_degrees_to_e7(degrees: float, field: str, name: str, where: str) -> int
     """
     e7 = degrees_to_e7(degrees)
     if e7 is None and not math.isnan(degrees):
-        raise MissionFileError(name, where, f"{field} is {shown(degrees)}", "give it in degrees")
+        raise MissionFileError(name, where, *Fault.NOT_DEGREES(what=field, text=shown(degrees)))
     return e7
 
 
 def refuse_decimal_comma(text: str, name: str, where: str) -> None:
     """Refuse a number with a comma: the program that wrote it would write the same again."""
     if _DECIMAL_COMMA.fullmatch(text):
-        raise MissionFileError(name, where, f"{shown(text)} has a decimal comma", _WITH_POINTS)
+        raise MissionFileError(name, where, *Fault.DECIMAL_COMMA(text=shown(text)))
 
 
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*", re.ASCII)
-_WITH_POINTS = "set the decimal symbol of Windows' region to a point and save it again, or replace the commas by points"
 #: MAV_CMD_NAV_FENCE_... and MAV_CMD_NAV_RALLY_POINT.
 _OTHER_PLANS = dict.fromkeys(range(5000, 5005), "a fence") | {5100: "rally points"}
 
-_OWN_FILE = "give the mission's own file"
-_SAVE_AS = "save the mission as QGC WPL 110 (.waypoints) or as a QGroundControl plan (.plan)"
-_TITLES = "name the columns in the first line: latitude,longitude,altitude(m)"
-_RESTORE = f"{_OWN_FILE}; `naze-bridge settings restore` takes settings"
 #: By the first bytes. A telemetry log has the time in eight bytes before each frame.
 _BINARY = (
     (re.compile(rb"\0[\0-\xff]{7}[\xfd\xfe]"), "a telemetry log (.tlog)"),
@@ -76,27 +70,27 @@ _BINARY = (
 )
 #: As much of a line as tells the kind: some of the patterns take quadratic time.
 _LONGEST = 200
-#: By the first line that is not a comment.
+#: By the first line that is not a comment: the fault, and the kind of file.
 _TEXTS = (
-    (re.compile(r"<(!doctype )?html.*", re.IGNORECASE), "a web page", "download the file itself (on GitHub: Raw)"),
-    (re.compile(r"\d+(\s+[-+.\w]+){10,11}"), "items without the header", "write QGC WPL 110 into a line above them"),
-    (re.compile(r"RALLY\b.*"), "rally points", _OWN_FILE),
-    (re.compile(r"-?\d+\.?\d*\s+-?\d+\.?\d*"), "a fence", _OWN_FILE),
-    (re.compile(r"(H Product:|FMT,|loopIteration,).*"), "a flight log", _SAVE_AS),
-    (re.compile(r"\$G[A-Z]{4},.*"), "a log of a GPS receiver", _SAVE_AS),
-    (re.compile(r":[0-9A-F]{10,}", re.IGNORECASE), "a firmware image", _SAVE_AS),
-    (re.compile(r"(set|feature|aux|serial|defaults|batch|profile)\s.*", re.IGNORECASE), "settings", _RESTORE),
-    (re.compile(r"[A-Za-z]\w*[,\s]+[-+.\d]+|\d+\t\d+\t\w+\t\S+\t\d+"), "settings", _RESTORE),
-    (re.compile(r"[^,;\t]*([,;\t][^,;\t]*){2,}"), "a table without names for latitude and longitude", _TITLES),
+    (re.compile(r"<(!doctype )?html.*", re.IGNORECASE), Fault.WEB_PAGE, ""),
+    (re.compile(r"\d+(\s+[-+.\w]+){10,11}"), Fault.NO_HEADER, ""),
+    (re.compile(r"RALLY\b.*"), Fault.OTHER_PLAN, "rally points"),
+    (re.compile(r"-?\d+\.?\d*\s+-?\d+\.?\d*"), Fault.OTHER_PLAN, "a fence"),
+    (re.compile(r"(H Product:|FMT,|loopIteration,).*"), Fault.OTHER_FILE, "a flight log"),
+    (re.compile(r"\$G[A-Z]{4},.*"), Fault.OTHER_FILE, "a log of a GPS receiver"),
+    (re.compile(r":[0-9A-F]{10,}", re.IGNORECASE), Fault.OTHER_FILE, "a firmware image"),
+    (re.compile(r"(set|feature|aux|serial|defaults|batch|profile)\s.*", re.IGNORECASE), Fault.SETTINGS_FOR_MISSION, ""),
+    (re.compile(r"[A-Za-z]\w*[,\s]+[-+.\d]+|\d+\t\d+\t\w+\t\S+\t\d+"), Fault.SETTINGS_FOR_MISSION, ""),
+    (re.compile(r"[^,;\t]*([,;\t][^,;\t]*){2,}"), Fault.NO_TITLES, ""),
 )
 
 
 def refuse_stranger(data: bytes, line: str, name: str) -> NoReturn:
     """Refuse a file without a mission by the first bytes, or by the first line that is not a comment."""
-    what = next((what for start, what in _BINARY if start.match(data)), "a binary file" if "\0" in line else None)
-    if what is not None:
-        raise MissionFileError(name, "", f"this is {what}", _SAVE_AS)
-    for start, what, remedy in _TEXTS:
+    kind = next((kind for start, kind in _BINARY if start.match(data)), "a binary file" if "\0" in line else None)
+    if kind is not None:
+        raise MissionFileError(name, "", *Fault.OTHER_FILE(kind=kind))
+    for start, fault, kind in _TEXTS:
         if start.fullmatch(line[:_LONGEST]):
-            raise MissionFileError(name, "", f"this file holds {what}", remedy)
-    raise MissionFileError(name, "", f"no mission begins with {shown(line)}", _SAVE_AS)
+            raise MissionFileError(name, "", *fault(kind=kind, kinds=kind))
+    raise MissionFileError(name, "", *Fault.STRANGE_FILE(line=shown(line)))

@@ -18,14 +18,14 @@ from protocols.mission_item import MissionItem
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from protocols.msp.nav_items import home_item, items_from_records
 from protocols.plain_text import shown
+from protocols.remedies import Fault
 
-_SAVE_AGAIN = "save it again from INAV Configurator or mwp"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?", re.ASCII | re.IGNORECASE)
 #: Not `wp save` and the like.
 _WP_LINE = re.compile(r"\s*wp\s+[-+\d]", re.ASCII | re.IGNORECASE)
 _WP_NUMBERS = re.compile(r"\s*wp(?:\s+-?\d{1,10})+\s*", re.ASCII | re.IGNORECASE)
 _ACTIONS = {int(action): action.name for action in NavAction}
-_USE_ACTION = f"use one of {', '.join(f'{name} ({number})' for number, name in _ACTIONS.items())}"
+_NAMED_ACTIONS = ", ".join(f"{name} ({number})" for number, name in _ACTIONS.items())
 _INT16, _INT32 = 2**15 - 1, 2**31 - 1
 #: The fields of a `wp` line after the number; INAV before 2.0 had no p2 and p3.
 _PLACE = ("action", "lat_e7", "lon_e7", "alt_cm")
@@ -55,12 +55,11 @@ def read_wp_lines(text: str, name: str, note: Note) -> list[MissionItem]:
             continue
         where, fields = f"line {number}", _WP_FIELDS.get(len(line.split()) - 2)
         if fields is None or not _WP_NUMBERS.fullmatch(line):
-            remedy = "write wp NUMBER ACTION LAT LON ALT P1 P2 P3 FLAG, as `dump` does"
-            raise MissionFileError(name, where, f"{shown(line)} is not a waypoint", remedy)
+            raise MissionFileError(name, where, *Fault.NOT_A_WP_LINE(line=shown(line)))
         values = dict(zip(fields, map(int, line.split()[2:]), strict=True))
         if values["action"]:  # 0 fills the unused slots of a dump
             if values["action"] not in _ACTIONS:
-                raise MissionFileError(name, where, f"action {values['action']} is unknown", _USE_ACTION)
+                raise _unknown_action(values["action"], name, where)
             numbers = {key: _within(value, key, name, where) for key, value in values.items()}
             records.append(NavRecord(**numbers))
     return _items(records, None, name, note)
@@ -81,10 +80,10 @@ def write_nav_xml(records: Sequence[NavRecord], home: tuple[int, int] | None) ->
 
 def _items(records: Sequence[NavRecord], home: tuple[int, int] | None, name: str, note: Note) -> list[MissionItem]:
     if not records:
-        raise MissionFileError(name, "", "the mission has no waypoints", _SAVE_AGAIN)
+        raise MissionFileError(name, "", *Fault.NO_ITEMS())
     missions = 1 + sum(record.flag == LAST for record in records[:-1])
     if missions > 1:
-        raise MissionFileError(name, "", f"the file holds {missions} missions", "save one of them as a file of its own")
+        raise MissionFileError(name, "", *Fault.MANY_MISSIONS(count=missions))
     if home is None:
         note(NO_HOME)
     unflagged = [replace(record, flag=0) if record.flag == LAST else record for record in records]
@@ -94,7 +93,7 @@ def _items(records: Sequence[NavRecord], home: tuple[int, int] | None, name: str
 def _from_xml(item: Element, name: str, where: str) -> NavRecord:
     action = item.get("action", "").upper()
     if action not in NavAction.__members__:
-        raise MissionFileError(name, where, f"its action is {shown(action)}", _USE_ACTION)
+        raise _unknown_action(action, name, where)
     values = {"action": int(NavAction[action])}
     for key in ("lat", "lon"):
         values[f"{key}_e7"] = _degrees(item.get(key, "0"), key, name, where) or 0
@@ -104,10 +103,14 @@ def _from_xml(item: Element, name: str, where: str) -> NavRecord:
     return NavRecord(**values)
 
 
+def _unknown_action(action: object, name: str, where: str) -> MissionFileError:
+    return MissionFileError(name, where, *Fault.UNKNOWN_ACTION(text=shown(action), actions=_NAMED_ACTIONS))
+
+
 def _within(value: int, field: str, name: str, where: str) -> int:
     key, _, unit = field.partition("_")
     if abs(value) > (_INT32 if unit else _INT16):
-        raise MissionFileError(name, where, f"{key} is {shown(value)}, out of range", _SAVE_AGAIN)
+        raise MissionFileError(name, where, *Fault.OUT_OF_RANGE(what=key, text=shown(value)))
     return value
 
 
@@ -119,5 +122,5 @@ def _float(text: str, key: str, name: str, where: str) -> float:
     refuse_decimal_comma(text, name, where)
     number = text.strip()
     if not _NUMBER.fullmatch(number) or abs(float(number)) > _INT32:
-        raise MissionFileError(name, where, f"{key} is {shown(text)}, not a number", _SAVE_AGAIN)
+        raise MissionFileError(name, where, *Fault.NOT_A_NUMBER(what=key, text=shown(text)))
     return float(number)

@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, ParseError, fromstring
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7, refuse_decimal_comma
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.plain_text import file_text, shown
+from protocols.remedies import Fault
 
 #: Characters. The parsed tree takes up to forty times the memory of the text.
 _MAX_SIZE = 2 * 2**20
@@ -29,7 +30,6 @@ _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GL
 _CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
 _CSV_ALT = {"altitude(m)": 1.0, "altitude": 1.0, "alt": 1.0, "height": 1.0, "altitude(ft)": _FEET}
 _ABOVE_GROUND = "1"
-_COORDINATES = "write decimal points, and blanks only between points"
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)", re.ASCII)
 
 
@@ -49,14 +49,14 @@ def parse_xml(text: str, name: str) -> Element:
     A document type is refused, because the entities in it can grow without limit or name other files.
     """
     if len(text) > _MAX_SIZE:
-        raise MissionFileError(name, "", "this XML is longer than 2 MB", "save only the path to be flown")
+        raise MissionFileError(name, "", *Fault.LONG_XML())
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise MissionFileError(name, "", "this XML has a document type", "delete the line that begins with <!DOCTYPE")
+        raise MissionFileError(name, "", *Fault.DOCUMENT_TYPE())
     try:
         root = fromstring(text.lstrip())  # noqa: S314 - without a document type it has no entities
     except ParseError as error:
         line, _ = error.position
-        raise MissionFileError(name, f"line {line}", "this XML is damaged", "save the file again") from None
+        raise MissionFileError(name, f"line {line}", *Fault.DAMAGED_FILE(kind="XML")) from None
     for element in root.iter():
         element.tag = element.tag.rpartition("}")[2].lower()
         element.attrib = {key.rpartition("}")[2].lower(): value for key, value in element.attrib.items()}
@@ -68,7 +68,7 @@ def read_kml(root: Element, name: str, note: Note, alt_m: float | None) -> list[
     lines = [element for element in root.iter() if element.tag == "linestring"]
     points = [element for element in root.iter() if element.tag == "point"]
     if len(lines) > 1:
-        raise MissionFileError(name, "", f"the file holds {len(lines)} paths", "save the one to be flown by itself")
+        raise MissionFileError(name, "", *Fault.MANY_PATHS(count=len(lines), kind="paths"))
     found = [point for shape in lines or points for point in _kml_points(shape, name)]
     return _items(found, name, note, alt_m)
 
@@ -82,9 +82,9 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
             with archive.open(inside) as file:
                 kml = file.read(_MAX_SIZE + 1)
     except StopIteration:
-        raise MissionFileError(name, "", "this zip archive holds no KML", "unpack it and give the mission") from None
+        raise MissionFileError(name, "", *Fault.NO_KML()) from None
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
-        raise MissionFileError(name, "", "this KMZ is damaged", "save it again") from None
+        raise MissionFileError(name, "", *Fault.DAMAGED_FILE(kind="KMZ")) from None
     return read_kml(parse_xml(file_text(kml), name), name, note, alt_m)
 
 
@@ -93,9 +93,7 @@ def read_gpx(root: Element, name: str, note: Note, alt_m: float | None) -> list[
     for kind, tag, point_tag in (("routes", "rte", "rtept"), ("tracks", "trk", "trkpt"), ("", "gpx", "wpt")):
         parts = [each for each in root.iter(tag) if each.find(f".//{point_tag}") is not None]
         if len(parts) > 1:
-            raise MissionFileError(
-                name, "", f"the file holds {len(parts)} {kind}", "save the one to be flown by itself"
-            )
+            raise MissionFileError(name, "", *Fault.MANY_PATHS(count=len(parts), kind=kind))
         if parts:
             return _items(list(_gpx_points(parts[0], point_tag, name)), name, note, alt_m)
     return _items([], name, note, alt_m)
@@ -122,8 +120,7 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
             continue
         where = f"line {number}"
         if len(row) != len(titles):
-            remedy = "save the table again, with decimal points"
-            raise MissionFileError(name, where, f"{len(row)} columns, but {len(titles)} titles", remedy)
+            raise MissionFileError(name, where, *Fault.UNEQUAL_ROW(count=len(row), wanted=len(titles)))
         cells = {title: cell.strip() for title, cell in zip(titles, row, strict=False)}
         if separator == ";":
             cells = {title: cell.replace(",", ".") for title, cell in cells.items()}
@@ -139,8 +136,8 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
 def _rows(text: str, separator: str, name: str) -> list[list[str]]:
     try:
         return [*csv.reader(text.splitlines(), delimiter=separator)]
-    except csv.Error as error:
-        raise MissionFileError(name, "", f"this table is damaged ({error})", "save it again") from None
+    except csv.Error:
+        raise MissionFileError(name, "", *Fault.DAMAGED_FILE(kind="table")) from None
 
 
 def _columns(text: str) -> tuple[str, list[str], str, str] | None:
@@ -160,7 +157,7 @@ def _kml_points(shape: Element, name: str) -> Iterator[_Point]:
         where = f"point {place}"
         fields = triple.split(",")
         if len(fields) not in (2, 3):
-            raise MissionFileError(name, where, f"{shown(triple)} is not LON,LAT,ALT", _COORDINATES)
+            raise MissionFileError(name, where, *Fault.NOT_A_PLACE(text=shown(triple)))
         has_height = frame is not None and len(fields) == 3
         alt_m = _number(fields[2], "the altitude", name, where) if has_height else None
         yield _Point(where, fields[1], fields[0], alt_m, Frame.GLOBAL if frame is None else frame)
@@ -176,10 +173,9 @@ def _gpx_points(part: Element, tag: str, name: str) -> Iterator[_Point]:
 
 def _items(points: Sequence[_Point], name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
     if not points:
-        raise MissionFileError(name, "", "the file holds no path", "draw a path, not an area, and save it again")
+        raise MissionFileError(name, "", *Fault.NO_PATH())
     if alt_m is None and (bare := next((point for point in points if point.alt_m is None), None)) is not None:
-        remedy = f"save it with altitudes, or set one: `naze-bridge convert {name} MISSION.waypoints --alt METRES`"
-        raise MissionFileError(name, bare.where, "the path has no altitude", remedy)
+        raise MissionFileError(name, bare.where, *Fault.NO_ALTITUDE(name=name))
     items = [_item(0, Frame.GLOBAL, None, None, 0.0)]
     for point in points:
         lat_e7, lon_e7 = (
@@ -202,5 +198,5 @@ def _number(text: str, what: str, name: str, where: str) -> float:
     refuse_decimal_comma(text, name, where)
     number = text.strip()
     if not _NUMBER.fullmatch(number) or not math.isfinite(float(number)):
-        raise MissionFileError(name, where, f"{what} is {shown(text)}, not a number", "save the file again")
+        raise MissionFileError(name, where, *Fault.NOT_A_NUMBER(what=what, text=shown(text)))
     return float(number)

@@ -15,6 +15,7 @@ from typing import Any
 from protocols.mission_file.error import MissionFileError, Note, file_degrees_to_e7, no_note, refuse_other_plans
 from protocols.mission_item import Command, Frame, MissionItem
 from protocols.plain_text import shown
+from protocols.remedies import Fault
 
 _PARAM_COUNT = 7
 _VERSIONS = (1,)
@@ -22,24 +23,22 @@ _VERSIONS = (1,)
 _MISSION_VERSIONS = (2, 1, 0)
 #: MAV_AUTOPILOT_ARDUPILOTMEGA and MAV_TYPE_QUADROTOR, as which the bridge appears to QGroundControl.
 _ARDUPILOT, _QUADROTOR = 3, 2
-_SAVE_AGAIN = "save it again from QGroundControl"
 
 
 def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionItem]:
     """Read the items, home first. MissionFileError names the file and the entry of mission.items, from 1."""
     plan = _parse(text, name)
     if not isinstance(plan, dict) or plan.get("fileType") not in ("Plan", None):
-        what = 'this is not a QGroundControl plan, its fileType is not "Plan"'
-        raise MissionFileError(name, "", what, _SAVE_AGAIN)
+        raise _not_a_plan(name, "", 'this is not a QGroundControl plan, its fileType is not "Plan"')
     _refuse_unknown_version(plan.get("version", _VERSIONS[0]), _VERSIONS, "the plan", name)
     mission = plan.get("mission")
     entries = mission.get("items") if isinstance(mission, dict) else None
     if not isinstance(mission, dict) or not isinstance(entries, list):
-        raise MissionFileError(name, "", "the plan has no mission.items", _SAVE_AGAIN)
+        raise _not_a_plan(name, "", "the plan has no mission.items")
     _refuse_unknown_version(mission.get("version", _MISSION_VERSIONS[0]), _MISSION_VERSIONS, "its mission", name)
     other = _other_parts(plan)
     if other and not entries:
-        raise MissionFileError(name, "", f"the plan holds {other} and no mission", "give the mission's own file")
+        raise MissionFileError(name, "", *Fault.OTHER_PLAN(kinds=f"{other} and no mission"))
     if other:
         note(f"the plan also holds {other}: ignored")
     if plan.get("fileType") is None:
@@ -55,9 +54,8 @@ def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionIte
 
 def _refuse_unknown_version(version: Any, known: tuple[int, ...], what: str, name: str) -> None:
     if version not in known:
-        known_ones = " and ".join(map(str, known))
-        text = f"{what} is of version {shown(version)}, and only {known_ones} can be read here"
-        raise MissionFileError(name, "", text, "open it in QGroundControl and save it as .plan")
+        found = Fault.PLAN_VERSION(what=what, version=shown(version), known=" and ".join(map(str, known)))
+        raise MissionFileError(name, "", *found)
 
 
 def _other_parts(plan: dict[str, Any]) -> str:
@@ -105,14 +103,17 @@ def _degrees(e7: int | None) -> float | None:
     return None if e7 is None else e7 / 1e7
 
 
+def _not_a_plan(name: str, where: str, why: str) -> MissionFileError:
+    return MissionFileError(name, where, *Fault.NOT_A_PLAN(why=why))
+
+
 def _parse(text: str, name: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
-        what = f"not valid JSON ({error.msg})"
-        raise MissionFileError(name, f"line {error.lineno}", what, _SAVE_AGAIN) from None
+        raise _not_a_plan(name, f"line {error.lineno}", f"not valid JSON ({error.msg})") from None
     except (ValueError, RecursionError):  # a number of thousands of digits; thousands of brackets
-        raise MissionFileError(name, "", "not a plan written by QGroundControl", _SAVE_AGAIN) from None
+        raise _not_a_plan(name, "", "not a plan written by QGroundControl") from None
 
 
 def _home(position: Any, name: str) -> MissionItem:
@@ -120,8 +121,7 @@ def _home(position: Any, name: str) -> MissionItem:
     where = "plannedHomePosition"
     coordinates = position if position is not None else []
     if not isinstance(coordinates, list) or len(coordinates) not in (0, 2, 3):
-        what = f"{shown(position)} where [latitude, longitude, altitude] must be"
-        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+        raise _not_a_plan(name, where, f"{shown(position)} where [latitude, longitude, altitude] must be")
     numbers = [_number(value, name, where) for value in coordinates]
     lat, lon, alt_m = (*numbers, *[math.nan] * 3)[:3]
     return MissionItem(
@@ -146,12 +146,10 @@ def _simple_items(entry: Any, name: str, where: str) -> Iterator[dict[str, Any]]
         transects = entry.get("TransectStyleComplexItem")
         flown_as = transects.get("Items") if isinstance(transects, dict) else None
         if not isinstance(flown_as, list) or not all(isinstance(item, dict) for item in flown_as):
-            what = f"a {shown(entry.get('complexItemType'))} carries no plain items"
-            raise MissionFileError(name, where, what, "use waypoints instead of it")
+            raise MissionFileError(name, where, *Fault.SURVEY_WITHOUT_ITEMS(kind=shown(entry.get("complexItemType"))))
         yield from flown_as
     else:
-        what = "its type is neither SimpleItem nor ComplexItem"
-        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+        raise _not_a_plan(name, where, "its type is neither SimpleItem nor ComplexItem")
 
 
 def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem:
@@ -161,7 +159,7 @@ def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem
         # Mission Planner's .mission stores the place separately.
         params = params[:4] + coordinate
     if not isinstance(params, list) or len(params) != _PARAM_COUNT:
-        raise MissionFileError(name, where, f"it has no list of {_PARAM_COUNT} params", _SAVE_AGAIN)
+        raise _not_a_plan(name, where, f"it has no list of {_PARAM_COUNT} params")
     command = _integer(entry, "command", 65535, name, where)
     frame = _integer(entry, "frame", 255, name, where)
     p1, p2, p3, p4, lat, lon, alt_m = (_number(param, name, where) for param in params)
@@ -174,8 +172,7 @@ def _integer(entry: dict[str, Any], key: str, highest: int, name: str, where: st
     value = entry.get(key)
     if type(value) is int and 0 <= value <= highest:
         return value
-    what = f"its {key} is {shown(value)}, not a whole number from 0 to {highest}"
-    raise MissionFileError(name, where, what, _SAVE_AGAIN)
+    raise MissionFileError(name, where, *Fault.NOT_WHOLE(what=f"its {key}", text=shown(value), most=highest))
 
 
 def _number(value: Any, name: str, where: str) -> float:
@@ -187,4 +184,4 @@ def _number(value: Any, name: str, where: str) -> float:
             return float(value)
         except OverflowError:  # an integer beyond 1.8e308
             pass
-    raise MissionFileError(name, where, f"{shown(value)} where a number must be", _SAVE_AGAIN)
+    raise MissionFileError(name, where, *Fault.NOT_A_NUMBER(what="a value", text=shown(value)))

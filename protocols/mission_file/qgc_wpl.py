@@ -25,6 +25,7 @@ from protocols.mission_file.error import (
 )
 from protocols.mission_item import Command, Frame, MissionItem, behind_home
 from protocols.plain_text import shown
+from protocols.remedies import Fault
 
 _HEADER, _VERSIONS = ["QGC", "WPL"], ("100", "110", "120")
 #: Version 100: the place of each of version 110's fields, and the commands by its numbers.
@@ -44,7 +45,6 @@ _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
 # float() and int() also accept underscores and digits of any script, which no ground station writes.
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
-_SAVE_AGAIN = "save the file again from the ground station"
 _NO_ITEM_0 = "there is no item 0: home is missing"
 _NO_HOME = "QGC WPL 120 has no home: the craft's position is used, or --home"
 
@@ -78,10 +78,9 @@ def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem
         elif has_header(line) and fields[2:] in ([each] for each in _VERSIONS):
             version = fields[2]
         else:
-            what = f"the header is {shown(line)}, not 'QGC WPL 110'"
-            raise MissionFileError(name, where, what, "save it as a QGC WPL 110 file (.waypoints)")
+            raise MissionFileError(name, where, *Fault.UNKNOWN_HEADER(header=shown(line)))
     if not items:
-        raise MissionFileError(name, "", "the file has no items", _SAVE_AGAIN)
+        raise MissionFileError(name, "", *Fault.NO_ITEMS())
     refuse_other_plans([item.command for item in items[1:]], name)
     return _numbered(items, note, has_home=version != "120")
 
@@ -89,12 +88,11 @@ def read_qgc_wpl(text: str, name: str, note: Note = no_note) -> list[MissionItem
 def _fields_110(fields: list[str], name: str, where: str) -> list[str]:
     """The fields of version 100 in the order of version 110."""
     if len(fields) != len(_ORDER_100) + 1:
-        what = f"{len(fields)} fields where an item of version 100 has {len(_ORDER_100) + 1}"
-        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+        raise MissionFileError(name, where, *Fault.TRUNCATED_LINE(count=len(fields), wanted=len(_ORDER_100) + 1))
     ordered = [fields[place] for place in _ORDER_100]
     command = _COMMANDS_100.get(ordered[3])
     if command is None:
-        raise MissionFileError(name, where, f"command {shown(ordered[3])} of version 100 is unknown", _SAVE_AGAIN)
+        raise MissionFileError(name, where, *Fault.UNKNOWN_COMMAND(text=shown(ordered[3])))
     ordered[3] = str(int(command))
     return ordered
 
@@ -130,20 +128,17 @@ def write_qgc_wpl(items: Sequence[MissionItem]) -> str:
 
 def _item(fields: list[str], name: str, where: str) -> MissionItem:
     if len(fields) != _FIELD_COUNT:
-        what = f"{len(fields)} fields where an item has {_FIELD_COUNT}, the line is truncated or damaged"
-        raise MissionFileError(name, where, what, _SAVE_AGAIN)
+        raise MissionFileError(name, where, *Fault.TRUNCATED_LINE(count=len(fields), wanted=_FIELD_COUNT))
     for token in fields:
         refuse_decimal_comma(token, name, where)
     integers = []
     for (field, highest), token in zip(_INTEGER_FIELDS.items(), fields, strict=False):
         if not _INTEGER.fullmatch(token) or int(token) > highest:
-            what = f"{field} is {shown(token)}, not a whole number from 0 to {highest}"
-            raise MissionFileError(name, where, what, _SAVE_AGAIN)
+            raise MissionFileError(name, where, *Fault.NOT_WHOLE(what=field, text=shown(token), most=highest))
         integers.append(int(token))
     for field, token in zip(_NUMBER_FIELDS, fields[len(integers) :], strict=True):
         if not _NUMBER.fullmatch(token):
-            what = f"{field} is {shown(token)}, not a number"
-            raise MissionFileError(name, where, what, _SAVE_AGAIN)
+            raise MissionFileError(name, where, *Fault.NOT_A_NUMBER(what=field, text=shown(token)))
     seq, _, frame, command = integers
     p1, p2, p3, p4, lat, lon, alt_m, _ = map(float, fields[len(integers) :])
     lat_e7 = file_degrees_to_e7(lat, "latitude", name, where)

@@ -19,13 +19,14 @@ import click
 from segno.helpers import make_wifi_data
 
 from protocols.plain_text import plain_text
+from protocols.remedies import Fault
 from service.cli.helper.action import HelperRefusal
 from service.cli.helper.signature import SIGNERS, check_signature, has_key, is_signed
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
 from service.cli.setup.hotspot import ADDRESS, CONNECTION
 from service.machine.package import shipped
-from service.settings.passphrase import STRONGER, new_passphrase, weakness
+from service.settings.passphrase import new_passphrase, weakness
 from service.web.token import new_token
 from storage.os_error import reason
 from storage.small_files import open_regular, read_bounded
@@ -159,12 +160,12 @@ def card(
     The first start installs the package, sets the bridge up and opens the hotspot, without a network or a terminal.
     """
     if new_key and key_file is not None:
-        raise click.UsageError("give either --key-file or --new-key")
+        raise click.UsageError(Fault.TWO_KEYS.text())
     password = secret_line(password_file)
     check_answers(hotspot, password, country, name)
     key = new_passphrase() if new_key else None if key_file is None else secret_line(key_file)
     if key and (weak := weakness(key)) is not None:
-        complain(f"warning: the key {weak}; {STRONGER}")
+        complain("warning: " + Fault.WEAK_KEY.text(why=f"the key {weak}"))
     token = new_token()
     named = ["--country", country.upper(), *(["--name", name] if name else [])]
     secrets = {"password": password, "web-token": token, **({"key": key} if key else {})}

@@ -17,6 +17,7 @@ from payloads.mission_data import verdict_data
 from protocols.mission_file import MissionFileError
 from protocols.mission_item import MissionItem, MissionResult, identify
 from protocols.param_file import ParamFileError
+from protocols.remedies import Fault
 from protocols.settings_file import SavedSettings, read_settings_file, unread_text
 from reports.finding import DROPPED, without_defaults
 from reports.verdict import Result, Verdict
@@ -96,14 +97,14 @@ def check(
     try:
         rules = _RULES[kind](RuleSettings(limit_m, saved))
     except ValueError as error:
-        raise click.UsageError(f"{settings_file}: {error}; correct that line, or save the settings again") from error
+        raise click.UsageError(Fault.BAD_SAVED_VALUE.text(why=f"{settings_file}: {error}")) from error
     codes = [_check_file(path, rules, home, strict, as_json) for path in files]
     ctx.exit(max(codes, key=_RANKS.index))
 
 
 def _saved_settings(path: Path, kind: str) -> SavedSettings:
     if kind != "inav":
-        raise click.UsageError("--settings is for --kind inav: no others' settings are needed")
+        raise click.UsageError(Fault.SETTINGS_OF_OTHERS.text())
     try:
         saved = read_settings_file(read_file(path, ParamFileError), shown_path(path))
     except ParamFileError as error:
@@ -143,7 +144,7 @@ def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]
     if verdict.assumed:
         say(f"Assumed: {', '.join(verdict.assumed)}")
     if any(finding.seq == 0 and finding.field in ("frame", "command") for finding in verdict.findings):
-        say("If the list has no home, --home LAT,LON adds it")
+        say("If {}, {}".format(*Fault.HOME_MISSING()))
     say("")
 
 

@@ -13,6 +13,7 @@ from protocols.mission_file import MissionFileError, write_mission_file
 from protocols.mission_file.nav_mission import write_nav_xml
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import NavRecord
+from protocols.remedies import Fault
 from reports.verdict import Result
 from terminal.command_group import PATH, position
 from terminal.files import load_mission, shown_path, write_file
@@ -41,11 +42,11 @@ def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, in
     """
     ending = target.suffix.lower()
     if ending not in (*_TEXT, *_NAV):
-        raise click.UsageError(f"{shown_path(target)}: name it .waypoints, .plan or .mission")
+        fail(MissionFileError(shown_path(target), "", *Fault.UNKNOWN_ENDING()), UNREADABLE)
     try:
         items = load_mission(source, alt_m)
         if alt_m is not None and any(item.alt_m != alt_m for item in items[1:]):
-            raise click.UsageError(f"--alt is for a KML, GPX or CSV: {shown_path(source)} has altitudes of its own")
+            raise MissionFileError(shown_path(source), "", *Fault.OWN_ALTITUDES())
         if not (items[0].lat_e7 and items[0].lon_e7):
             home = home or (0, 0)  # which ground stations read as unknown
         items = list(with_home(items, home))

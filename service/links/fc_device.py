@@ -13,9 +13,10 @@ from typing import Any, Protocol
 
 import serial
 
+from protocols.remedies import Fault
 from service.links.port_holder import BUSY, explain_port_error, find_console
 from service.machine.threads import BackgroundThread
-from service.settings.addresses import UNKNOWN_HOST_HINT, AutoFc, FcAddress, SerialFc, TcpFc, UdpFc, bindable, family_of
+from service.settings.addresses import AutoFc, FcAddress, SerialFc, TcpFc, UdpFc, bindable, family_of
 from storage.os_error import reason
 
 #: Errors of an open port: pyserial raises the last two if it is unplugged, or the driver refuses the speed.
@@ -151,5 +152,5 @@ def _explained(address: TcpFc | UdpFc, hint: str) -> Iterator[None]:
     except (OSError, TimeoutError) as error:
         why = reason(error) or "no answer"
         if isinstance(error, socket.gaierror):
-            hint = UNKNOWN_HOST_HINT
+            _, hint = Fault.UNKNOWN_HOST(why="")
         raise PortError(f"{address} cannot be reached: {why}" + f"; {hint}" * bool(hint)) from error

@@ -5,17 +5,18 @@ import errno
 from typing import Protocol
 
 from bridge.gcs.station import Peer
+from protocols.remedies import Fault
 from service.links.gcs_events import GcsEvents
 from service.links.serial_link import SerialLink
 from service.links.tcp_link import TcpLink
 from service.links.udp_link import UdpLink
-from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress
+from service.settings.addresses import GcsAddress
 from storage.os_error import reason
 
-_HINTS = {
-    errno.EADDRINUSE: "stop the program that uses it, or choose another port",
-    errno.EADDRNOTAVAIL: "this machine has no such address; 0.0.0.0 means all of its addresses",
-    errno.EACCES: "ports below 1024 need root; choose another port",
+_FAULTS = {
+    errno.EADDRINUSE: Fault.LINK_IN_USE,
+    errno.EADDRNOTAVAIL: Fault.LINK_ELSEWHERE,
+    errno.EACCES: Fault.LINK_OF_ROOT,
 }
 
 
@@ -43,6 +44,6 @@ def open_link(address: GcsAddress, events: GcsEvents) -> GcsLink:
         return SerialLink(address, events) if address.is_serial else UdpLink(address, events)
     except OSError as error:
         number = error.errno or 0  # below 0 it is one of getaddrinfo's
-        hint = UNKNOWN_HOST_HINT if number < 0 else _HINTS.get(number, "")
-        text = f"{address} cannot be opened: {reason(error)}"
-        raise LinkError(f"{text}; {hint}" if hint else text) from error
+        fault = Fault.UNKNOWN_HOST if number < 0 else _FAULTS.get(number)
+        why = f"{address} cannot be opened: {reason(error)}"
+        raise LinkError(why if fault is None else fault.text(why=why)) from error

@@ -15,10 +15,11 @@ from typing import Any
 import structlog
 
 from bridge.gcs.station import Peer
+from protocols.remedies import Fault
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
 from service.machine.threads import BackgroundThread
-from service.settings.addresses import UNKNOWN_HOST_HINT, GcsAddress, bindable, family_of
+from service.settings.addresses import GcsAddress, bindable, family_of
 from storage.os_error import reason
 
 _DATAGRAM_SIZE = 2048
@@ -117,7 +118,7 @@ class UdpLink:
             try:
                 found = await resolver.ask(look_up)
             except OSError as error:
-                why = f"{reason(error)}; {UNKNOWN_HOST_HINT}"
+                why = Fault.UNKNOWN_HOST.text(why=reason(error))
                 warn_once(self._warned, "gcs.name_unknown", link=self.name, why=why)
             else:
                 peers = [Peer(self.name, entry[4]) for entry in found]

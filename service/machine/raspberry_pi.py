@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass
 from datetime import timedelta
 
+from protocols.remedies import Fault
 from service.machine.host import Host
 
 #: Bookworm and later, and before.
@@ -61,7 +62,7 @@ def clock_trouble(off_s: float, whose: str) -> str:
         return ""
     far = timedelta(seconds=round(abs(off_s)))
     side = "behind" if off_s > 0 else "ahead of"
-    return f"the Pi's clock is {far} {side} {whose}: sudo date --set '{off_s:+.0f} seconds'"
+    return ": ".join(Fault.LATE_CLOCK(far=far, side=side, whose=whose, off_s=off_s))
 
 
 def boot_file(host: Host, name: str) -> str | None:

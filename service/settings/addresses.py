@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-UNKNOWN_HOST_HINT = "check the name and the network, or give the address in numbers"
+from protocols.remedies import FC_FORMS, GCS_FORMS, Fault
 
 
 class AddressError(ValueError):
@@ -94,10 +94,6 @@ class GcsAddress:
 
 _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
-_FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT, udp:HOST:PORT, udpin:0.0.0.0:PORT or sim"
-_GCS_FORMS = (
-    "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:HOST:PORT or, for a radio, /dev/ttyUSB1,57600"
-)
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
 _NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:|/)")
@@ -112,12 +108,12 @@ def parse_fc(text: str) -> FcAddress:
         case "sim" if not rest:
             return SimulatedFc()
         case "tcp" if colon:
-            return TcpFc(*parse_host_port(text, rest.removeprefix("//"), _FC_FORMS))
+            return TcpFc(*parse_host_port(text, rest.removeprefix("//"), FC_FORMS))
         case ("udp" | "udpin" | "udpout") as form if colon:
             place = rest.removeprefix("//").removeprefix(":")
             if place.isdecimal():  # mwp's udp://:14014
                 place = f"0.0.0.0:{place}"
-            host, port = parse_host_port(text, place, _FC_FORMS)
+            host, port = parse_host_port(text, place, FC_FORMS)
             return UdpFc(host, port, form == "udpin" or (form == "udp" and is_any_address(host)))
         case "serial" if colon:
             return _parse_serial(text, rest.removeprefix("//") if rest.startswith("///") else rest)
@@ -135,11 +131,11 @@ def _parse_serial(text: str, port: str) -> SerialFc:
             separator = ""
     if not path.startswith("/"):
         hint = f"did you mean /dev/{port}? Else " if path.startswith(_PORT_NAMES) else ""
-        raise AddressError(f"{text!r} is not a flight controller connection: {hint}{_FC_FORMS}")
+        raise AddressError(Fault.NOT_AN_FC.text(text=repr(text), hint=hint))
     if not separator:
         return SerialFc(path, None)
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
-        raise AddressError(f"{text!r}: {baud!r} is not a baud rate; omit it to auto-detect")
+        raise AddressError(Fault.NOT_A_BAUD.text(text=repr(text), baud=repr(baud)))
     return SerialFc(path, int(baud))
 
 
@@ -157,7 +153,7 @@ def parse_gcs(text: str) -> GcsAddress:
     if text.strip().startswith("/"):
         radio = _parse_serial(text, text.strip())
         if radio.baud is None:
-            raise AddressError(f"{text!r}: add the radio's serial speed, as in {radio.path},57600")
+            raise AddressError(Fault.NO_RADIO_SPEED.text(text=repr(text), path=radio.path))
         return GcsAddress("serial", radio.path, radio.baud)
     word, colon, rest = text.strip().partition(":")
     kind = word.lower()
@@ -168,13 +164,13 @@ def parse_gcs(text: str) -> GcsAddress:
         if host not in _EVERY_ADDRESS:
             port = port if port.isdecimal() else "14550"
             sending = f"udpout:{host}:{port} to send there, " if kind == "udp" else ""
-            raise AddressError(f"{text!r}: write {sending}{kind}in:0.0.0.0:{port} to listen for ground stations")
+            raise AddressError(Fault.SENT_OR_HEARD.text(text=repr(text), sending=sending, kind=kind, port=port))
         kind += "in"
     if not colon or kind not in _GCS_KINDS:
-        raise AddressError(f"{text!r} is not a ground station connection: {_meant_gcs(word, rest)}{_GCS_FORMS}")
+        raise AddressError(Fault.NOT_A_GCS.text(text=repr(text), hint=_meant_gcs(word, rest)))
     if kind in ("udpin", "tcpin") and not host and port.isdecimal():
         host = "0.0.0.0"  # noqa: S104  # as above
-    return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, _GCS_FORMS))
+    return GcsAddress(kind, *parse_host_port(text, f"{host}:{port}" if host else rest, GCS_FORMS))
 
 
 def parse_table(entry: object, setting: str, example: str, keys: Sequence[str]) -> tuple[GcsAddress, dict[str, object]]:
@@ -231,13 +227,13 @@ def parse_host_port(text: str, rest: str, forms: str) -> tuple[str, int]:
     if host.startswith("[") and host.endswith("]"):
         host = host[1:-1]
     elif ":" in host:
-        raise AddressError(f"{text!r}: write an IPv6 address in brackets, as in [::1]:5760")
+        raise AddressError(Fault.NO_BRACKETS.text(text=repr(text)))
     if not colon or not host:
-        raise AddressError(f"{text!r} needs a host and a port: {forms}")
+        raise AddressError(Fault.NO_PORT.text(text=repr(text), forms=forms))
     if not port.isdecimal() or not 0 < int(port) < 65536:
-        raise AddressError(f"{text!r}: {port!r} is not a port number (1..65535)")
+        raise AddressError(Fault.NOT_A_PORT.text(text=repr(text), port=repr(port)))
     try:
         host.encode("idna")
     except UnicodeError:
-        raise AddressError(f"{text!r}: {host!r} is not a host name: {forms}") from None
+        raise AddressError(Fault.NOT_A_HOST.text(text=repr(text), host=repr(host), forms=forms)) from None
     return host, int(port)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.signing import key_from_passphrase
+from protocols.remedies import Fault
 from service.settings.addresses import AddressError, GcsAddress, parse_gcs, parse_table
 from service.settings.passphrase import weakness
 from storage.os_error import reason
@@ -84,16 +85,16 @@ def read_passphrase(path: Path) -> str:
     try:
         with open_regular(path) as file:
             if os.fstat(file.fileno()).st_mode & stat.S_IRWXO:
-                raise AddressError(f"key_file {path} is readable by other users: run chmod 600 {path}")
+                raise AddressError(Fault.KEY_FILE_OPEN.text(path=path))
             passphrase = file.read(_MAX_PASSPHRASE + 1).decode()
     except OSError as error:
         raise AddressError(f"key_file {path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         # Not "from" the error, which quotes the passphrase.
-        raise AddressError(f"key_file {path} holds no text: write the passphrase into it, on one line") from None
+        raise AddressError(Fault.KEY_FILE_BINARY.text(path=path)) from None
     passphrase = passphrase.removesuffix("\n").removesuffix("\r")
     if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
-        raise AddressError(f"key_file {path} must hold the passphrase on one line, and nothing else")
+        raise AddressError(Fault.KEY_FILE_LINES.text(path=path))
     return passphrase
 
 

@@ -40,7 +40,7 @@ def vehicles(router: Router, tmp_path: Path) -> Iterator[subprocess.Popen[bytes]
 def test_a_thousand_vehicles_are_listed(router: Router, vehicles: subprocess.Popen[bytes]) -> None:
     def found() -> dict[str, Any]:
         listed = run_naze_bridge("fleet", "list", "--json", "--connect", router.endpoint)
-        return json.loads(listed.stdout) if listed.stdout else {}  # type: ignore[no-any-return]
+        return json.loads(listed.stdout) if listed.stdout else {}
 
     until(lambda: (found().get("alive"), found().get("unanswered")) == (_COUNT, _SILENT), "all vehicles")
     vehicles_found = found()["vehicles"]

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from payloads.mission_data import Json
+from protocols.remedies import Fault
 from service.cli.doctor.checked import Checked, Grade, problem
 from service.daemon.client import STATUS, ControlError, ask_daemon
 from service.machine import event_loop
@@ -73,7 +74,7 @@ def examined(
         settings = load_settings(config, fc=fc, state_dir=state_dir)
     except SettingsError as error:
         for wrong in error.problems:
-            yield problem("configuration", str(wrong), "correct this, and run doctor again")
+            yield problem("configuration", *Fault.BAD_CONFIGURATION(why=wrong))
         return
     if config is not None:
         yield Checked("configuration", Grade.OK, f"{config} can be used")

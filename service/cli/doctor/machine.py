@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from protocols.plain_text import plain_text
+from protocols.remedies import Fault
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.cli.doctor.fixes import RESTART_BRIDGE
 from service.daemon.store_worker import DATABASE_NAME
@@ -24,12 +25,10 @@ from storage.store_error import StoreError
 _TIME_PROGRAMS = ("chronyd", "ntpd", "gpsd")
 #: A Pi without a clock starts in 1970, or at the last shutdown. No release is older than this.
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
-_SET_CLOCK = "sudo date --set 'YEAR-MONTH-DAY HOUR:MINUTE', with the present time"
 _LEAST_FREE = 64 << 20
 _LIBRARIES = ("pyserial", "eclipse-zenoh")
 #: Bits of the reply: undervoltage now, and since the start.
 _NOW, _SINCE_START = 1 << 0, 1 << 16
-_BETTER_SUPPLY = "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires"
 
 
 def check_versions(host: Host) -> Checked:
@@ -51,14 +50,13 @@ def check_clock(host: Host, now: datetime, trouble: str = "") -> Checked:
         found, _, remedy = trouble.partition(": ")
         return problem("clock", found, remedy)
     if now < EPOCH:
-        return problem("clock", f"it is {time_text}, years in the past", _SET_CLOCK)
+        return problem("clock", *Fault.OLD_CLOCK(time=time_text))
     if host.path(SYNCHRONIZED).exists():
         return ok("clock", f"{time_text}, set by the network")
     keeper = next((process.name for process in host.processes() if process.name in _TIME_PROGRAMS), None)
     if keeper is not None:
         return ok("clock", f"{time_text}, kept by {keeper}")
-    remedy = f"connect to the Internet once, or before the flight: {_SET_CLOCK}"
-    return note("clock", f"{time_text}, not set by the network since the start", remedy)
+    return note("clock", *Fault.UNSET_CLOCK(time=time_text))
 
 
 def check_root(host: Host) -> Checked | None:
@@ -68,11 +66,9 @@ def check_root(host: Host) -> Checked | None:
     disks = [disk.split() for mount, disk in mounts if mount.split()[4:5] == ["/"]]
     kind, _, options = (*disks[-1], "", "", "")[:3] if disks else ("", "", "")
     if kind == "overlay":
-        remedy = "sudo raspi-config nonint disable_overlayfs && sudo reboot"
-        return note("root", "an overlay in memory: settings, missions and logs are lost at power-off", remedy)
+        return note("root", *Fault.ROOT_IN_MEMORY())
     if "ro" in options.split(","):
-        remedy = "sudo mount -o remount,rw /; if that fails, the card may be worn out: look at `sudo dmesg`"
-        return note("root", "read-only: settings and updates cannot be stored", remedy)
+        return note("root", *Fault.READ_ONLY_ROOT())
     return None
 
 
@@ -82,23 +78,18 @@ def check_disk(state_dir: Path, free_of: Callable[[Path], int] = lambda path: sh
         while not folder.exists():
             folder = folder.parent
         if not folder.is_dir():
-            remedy = f"move {folder} away, or name another state_dir"
-            return problem("disk", f"{state_dir} cannot be used: {folder} is a file", remedy)
+            return problem("disk", *Fault.STATE_DIR_IS_FILE(path=state_dir, folder=folder))
         if not os.statvfs(folder).f_blocks:
-            remedy = "name a folder on a disk as state_dir"
-            return problem("disk", f"{state_dir} cannot be made: {folder} keeps no files", remedy)
+            return problem("disk", *Fault.STATE_DIR_NOT_KEPT(path=state_dir, folder=folder))
         free = free_of(folder)
     except PermissionError:
-        return note("disk", f"no permission to read {state_dir}", "run doctor with sudo")
+        return note("disk", *Fault.NOT_ALLOWED(use="read", path=state_dir))
     if os.statvfs(folder).f_flag & os.ST_RDONLY:
-        remedy = "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /"
-        return problem("disk", f"{folder} is on a disk that is read-only", remedy)
+        return problem("disk", *Fault.READ_ONLY_DISK(path=folder))
     if os.geteuid() and not os.access(folder, os.W_OK):
-        return note("disk", f"no permission to write to {folder}", "run doctor with sudo")
-    space = f"{free >> 20} MB free for {state_dir}"
-    if free < _LEAST_FREE:
-        return problem("disk", space, f"remove unneeded files, such as old logs: ls -l {state_dir}/logs")
-    return ok("disk", space)
+        return note("disk", *Fault.NOT_ALLOWED(use="write to", path=folder))
+    found = Fault.DISK_NEARLY_FULL(free=free >> 20, path=state_dir)
+    return problem("disk", *found) if free < _LEAST_FREE else ok("disk", found[0])
 
 
 def check_database(state_dir: Path) -> list[Checked]:
@@ -108,14 +99,13 @@ def check_database(state_dir: Path) -> list[Checked]:
         exists = path.exists()
         aside = kept_aside(path)
     except PermissionError:
-        return [note("missions", f"no permission to read {path}", "run doctor with sudo")]
+        return [note("missions", *Fault.NOT_ALLOWED(use="read", path=path))]
     if not exists:
         found.append(ok("missions", f"none stored yet in {state_dir}"))
     else:
         found.append(_look_into(path))
     if aside:
-        remedy = f"to save its readable part: sqlite3 {aside[-1]} .recover; then move it away"
-        found.append(note("missions", f"a damaged store was kept as {aside[-1]}", remedy))
+        found.append(note("missions", *Fault.STORE_KEPT_ASIDE(path=aside[-1])))
     return found
 
 
@@ -126,14 +116,13 @@ def _look_into(path: Path) -> Checked:
             (finding,) = database.execute("PRAGMA quick_check(1)").fetchone()
             (count,) = database.execute("SELECT count(*) FROM missions").fetchone()
     except StoreError as error:
-        return problem("missions", str(error), "move it away, and restart the bridge")
+        return problem("missions", *Fault.STORE_UNUSABLE(why=error))
     except sqlite3.Error as error:
         finding = str(error)
     finding = plain_text(finding)  # it may quote names in the file
     if finding == "ok":
         return ok("missions", f"{count} stored in {path}, intact")
-    remedy = "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)"
-    return problem("missions", f"{path} is damaged: {finding}", remedy, RESTART_BRIDGE)
+    return problem("missions", *Fault.STORE_DAMAGED(path=path, why=finding), RESTART_BRIDGE)
 
 
 def output_of(*command: str) -> str:
@@ -154,7 +143,7 @@ def check_power(ask: Callable[..., str] = output_of) -> Checked | None:
     except ValueError:
         return None  # not a Pi, or no permission
     if flags & _NOW:
-        return problem("power", "the supply's voltage is too low", _BETTER_SUPPLY)
+        return problem("power", *Fault.LOW_VOLTAGE(when="is too low"))
     if flags & _SINCE_START:
-        return note("power", "the supply's voltage was too low since the start", _BETTER_SUPPLY)
+        return note("power", *Fault.LOW_VOLTAGE(when="was too low since the start"))
     return ok("power", "no undervoltage since the start")

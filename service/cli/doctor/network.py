@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from payloads.names import ZenohSettingsError
+from protocols.remedies import Fault
 from service.cli.doctor.checked import Checked, note, ok, problem
 from service.cli.doctor.fixes import RESTART_BRIDGE, UNBLOCK_WIFI
 from service.cli.doctor.machine import output_of
@@ -13,7 +14,6 @@ from service.machine.host import Host
 from service.machine.package import page
 from service.settings import Settings
 from service.settings.addresses import GcsAddress
-from service.settings.passphrase import STRONGER
 from service.settings.write_access import WriteAccess
 from service.settings.zenoh import ZenohSettings
 
@@ -30,22 +30,17 @@ def check_wifi(host: Host, gcs: Sequence[GcsAddress]) -> list[Checked]:
         and host.read(f"/sys/class/rfkill/{name}/soft").strip() == "1"
     ]
     if blocked:
-        remedy = "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan"
-        return [problem("Wi-Fi", "is switched off (rfkill)", remedy, UNBLOCK_WIFI)]
+        return [problem("Wi-Fi", *Fault.WIFI_BLOCKED(), UNBLOCK_WIFI)]
     cards = host.wifi_cards()
     if not cards:
-        return [note("Wi-Fi", "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in")]
+        return [note("Wi-Fi", *Fault.NO_WIFI())]
     return [_card(host, card, gcs) for card in cards]
 
 
 def _card(host: Host, card: str, gcs: Sequence[GcsAddress]) -> Checked:
     address = host.address(card)
     if address is None:
-        return note(
-            "Wi-Fi",
-            f"{card} has no address",
-            f"join a network, or open a hotspot: {page('docs/howto/wifi-access-point.md')}",
-        )
+        return note("Wi-Fi", *Fault.NO_ADDRESS(card=card, page=page("docs/howto/wifi-access-point.md")))
     ports = [str(link.port) for link in gcs if link.kind in ("udpin", "tcpin")]
     return ok(
         "Wi-Fi", f"{card} is {address}" + (f"; ground stations connect to port {', '.join(ports)}" if ports else "")
@@ -63,20 +58,16 @@ def check_ports(
     for transport, port in dict.fromkeys(ports):
         yield _check_port(host, transport, port, is_running=is_running)
         if is_blocked(rules, transport, port):
-            found = f"the firewall (nftables) drops packets to {transport.upper()} port {port}"
-            rule = f"sudo nft insert rule {_input_chain(rules)} {transport} dport {port} accept"
-            allow = (
-                f"sudo ufw allow {port}/{transport}" if "ufw" in rules else f"{rule}; also add it to /etc/nftables.conf"
-            )
-            yield note("firewall", found, allow)
+            fault = Fault.FIREWALL_UFW if "ufw" in rules else Fault.FIREWALL
+            what, chain = f"{transport.upper()} port {port}", _input_chain(rules)
+            yield note("firewall", *fault(what=what, chain=chain, transport=transport, port=port))
 
 
 def _check_port(host: Host, transport: str, port: int, *, is_running: bool) -> Checked:
     what = f"{transport.upper()} port {port}"
     inode = _inode(host, transport, port)
     if inode is None and is_running:
-        remedy = "look at its log (journalctl -u naze-bridge), and restart it: sudo systemctl restart naze-bridge"
-        return problem("listening port", f"the daemon does not listen on {what}", remedy, RESTART_BRIDGE)
+        return problem("listening port", *Fault.NOT_LISTENING(what=what), RESTART_BRIDGE)
     if inode is None:
         return ok("listening port", f"{what} is free")
     holder = host.holder(f"socket:[{inode}]")
@@ -85,11 +76,11 @@ def _check_port(host: Host, transport: str, port: int, *, is_running: bool) -> C
     if holder is None and os.geteuid() and is_running:
         return ok("listening port", f"{what} is in use; only root sees by which program")
     if holder is None and os.geteuid():
-        hidden = "only root sees which: run doctor with sudo"
-        return problem("listening port", f"{what} is used by another program", hidden)
-    remedy = f"stop it: {host.stop_command(holder)}; or use another port" if holder else "restart the Pi"
-    found = f"{what} is used by {holder or 'a program that is gone'}"
-    return problem("listening port", found, remedy)
+        return problem("listening port", *Fault.HIDDEN_LISTENER(what=what))
+    if holder is None:
+        return problem("listening port", *Fault.LOST_LISTENER(what=what))
+    found = Fault.OTHER_LISTENER(what=what, program=holder, command=host.stop_command(holder))
+    return problem("listening port", *found)
 
 
 def is_blocked(rules: str, transport: str, port: int) -> bool:
@@ -126,10 +117,9 @@ def check_keys(gcs: Sequence[GcsAddress], access_by_link: Mapping[str, WriteAcce
     for link in gcs:
         access = access_by_link.get(str(link), WriteAccess())
         if access.is_open and link.kind != "udpout" and link.is_public:
-            found = f"{link}: anyone on this network can change missions and settings"
-            yield note("key", found, "sudo naze-bridge setup --new-key makes a key that changes need, and shows it")
+            yield note("key", *Fault.NO_KEY(link=link))
         elif access.weak_key is not None:
-            yield note("key", f"{link}: {access.weak_key}", STRONGER)
+            yield note("key", *Fault.WEAK_KEY(why=f"{link}: {access.weak_key}"))
         elif access.key is not None:
             yield ok("key", f"required for changes on {link}")
 
@@ -145,7 +135,7 @@ def check_zenoh(settings: ZenohSettings | None) -> Checked:
     try:
         config = make_config(settings)
     except ZenohSettingsError as error:
-        return problem("zenoh", str(error), "correct the [zenoh] table or its config_file")
+        return problem("zenoh", *Fault.BAD_ZENOH(why=error))
     me = f"{settings.prefix}/{settings.vehicle}"
     endpoints = connect_endpoints(config)
     if not endpoints:

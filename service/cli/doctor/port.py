@@ -6,6 +6,7 @@ import re
 import stat
 from pathlib import Path
 
+from protocols.remedies import Fault
 from service.cli.doctor.checked import Checked, ok, problem
 from service.cli.doctor.fixes import ENABLE_UART, FIND_FC, FREE_UART, OPEN_PORTS
 from service.cli.setup.steps import header_consoles
@@ -42,22 +43,23 @@ def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
     device = host.resolve(fc.path)
     model = pi_model(host)
     if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
-        found = f"/dev/serial0 is the debug socket on a {model.name}: the header's pins are {model.header_uart}"
-        remedy = fc_remedy(model.header_uart, source)
-        return problem("port", found, remedy, fc_fix(source))
+        header = model.header_uart
+        found = Fault.DEBUG_SOCKET(model=model.name, header=header, set_fc=fc_remedy(header, source))
+        return problem("port", *found, fc_fix(source))
     if host.is_tty(device):
         return ok("port", fc.path if str(device) == fc.path else f"{fc.path} is {device}")
     there = [f"/dev/{name}" for pattern in _PORTS for name in host.names("/dev", pattern)]
     if not fc.path.startswith(("/dev/serial0", "/dev/ttyAMA", "/dev/ttyS")):
-        remedy, fix = "plug the flight controller in", ""
+        fault, fix = Fault.PORT_UNPLUGGED, ""
     elif model is None:
-        remedy, fix = "enable this UART in the board's own boot settings", ""
+        fault, fix = Fault.PORT_OFF_ELSEWHERE, ""
     else:
-        remedy, fix = "enable the UART on the header: sudo naze-bridge setup", ENABLE_UART
+        fault, fix = Fault.PORT_OFF, ENABLE_UART
+    other = ""
     if there:
-        remedy += f"; or use {' or '.join(there)}: {fc_remedy(there[0], source)}"
+        other = f"; or use {' or '.join(there)}: {fc_remedy(there[0], source)}"
         fix = fix or fc_fix(source)
-    return problem("port", f"{fc.path} is missing, or no serial port", remedy, fix)
+    return problem("port", *fault(path=fc.path, other=other), fix)
 
 
 def check_candidates(host: Host) -> list[SerialFc]:
@@ -68,8 +70,7 @@ def check_candidates(host: Host) -> list[SerialFc]:
 
 
 def check_no_port() -> Checked:
-    remedy = "plug the flight controller into USB, or name its port: sudo naze-bridge setup --fc /dev/NAME"
-    return problem("port", "there is no serial port for a flight controller", remedy)
+    return problem("port", *Fault.NO_PORTS())
 
 
 def check_permission(host: Host, fc: FcAddress) -> Checked | None:
@@ -85,10 +86,8 @@ def check_permission(host: Host, fc: FcAddress) -> Checked | None:
     if found.st_mode & stat.S_IRGRP and found.st_mode & stat.S_IWGRP and group == _GROUP:
         return ok("permission", f"{device} is open to the group {_GROUP}")
     mode = stat.filemode(found.st_mode)
-    own = f"if it stays so, another udev rule decides: {page('docs/install.md')}"
-    remedy = f"sudo udevadm trigger --settle --subsystem-match=tty; {own}"
-    found_text = f"{device} belongs to the group {group} with {mode}, and not to {_GROUP}"
-    return problem("permission", found_text, remedy, OPEN_PORTS)
+    fault = Fault.PORT_CLOSED_TO_US(device=device, group=group, mode=mode, page=page("docs/install.md"))
+    return problem("permission", *fault, OPEN_PORTS)
 
 
 def check_console(host: Host, fc: FcAddress) -> Checked | None:
@@ -99,25 +98,22 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     names = {device.name, Path(fc.path).name if isinstance(fc, SerialFc) else device.name}
     # The firmware's name for the header's UART.
     names |= {"serial0"} if host.resolve("/dev/serial0") == device else set()
-    found, remedies = [], []
+    found: list[tuple[str, str]] = []
     getty = f"serial-getty@{device.name}"
     is_running = host.has_login(device.name)
     if is_running or host.names("/etc/systemd/system/getty.target.wants", f"{getty}.service"):
-        found.append(f"{getty} {'runs there' if is_running else 'is enabled'}")
-        remedies.append(f"sudo systemctl disable --now {getty}.service")
+        found.append(Fault.CONSOLE_RUNS(getty=getty, state="runs there" if is_running else "is enabled"))
     words = re.compile(rf"\bconsole=({'|'.join(map(re.escape, sorted(names)))})(?:,\S*)?(?=\s|$)")
     file = boot_file(host, "cmdline.txt")
     if file is not None and (named := words.search(host.read(file))):
-        found.append(f"{named[0]} is in {file}")
-        remedies.append(f"sudo sed -i 's/console={named[1]}[^ ]* *//' {file} && sudo reboot")
+        found.append(Fault.CONSOLE_IN_FILE(word=named[0], file=file, name=named[1]))
     elif named := words.search(host.read("/proc/cmdline")):
-        found.append(f"the kernel was started with {named[0]}")
-        by_hand = "remove that word from the boot loader's command line, and reboot"
-        remedies.append(by_hand if file is None else "sudo naze-bridge setup && sudo reboot")
+        found.append((Fault.CONSOLE_ELSEWHERE if file is None else Fault.CONSOLE_OF_KERNEL)(word=named[0]))
     fix = FREE_UART if names & {*header_consoles(host)} else ""
     if not found:
         return ok("console", f"no login console on {device}")
-    return problem("console", f"a login console has {device}: {'; '.join(found)}", "; then ".join(remedies), fix)
+    sentences, remedies = zip(*found, strict=True)
+    return problem("console", f"a login console has {device}: {'; '.join(sentences)}", "; then ".join(remedies), fix)
 
 
 def check_holder(host: Host, fc: FcAddress, source: str = "") -> Checked | None:
@@ -131,11 +127,11 @@ def check_holder(host: Host, fc: FcAddress, source: str = "") -> Checked | None:
         return None  # reported by the console's check
     if holder.is_naze_bridge:
         return ok("other programs", f"the daemon has {device} open, pid {holder.pid}")
-    found = f"{holder} has {device} open"
     if holder.name in _BLUETOOTH and (header := host.resolve("/dev/serial0")) != device and host.is_tty(header):
-        remedy = f"this UART is Bluetooth's, the header has another: {fc_remedy('/dev/serial0', source)}"
-        return problem("other programs", found, remedy, fc_fix(source))
-    return problem("other programs", found, f"stop it: {host.stop_command(holder)}")
+        found = Fault.BLUETOOTH_PORT(program=holder, device=device, set_fc=fc_remedy("/dev/serial0", source))
+        return problem("other programs", *found, fc_fix(source))
+    found = Fault.PORT_IN_USE(program=holder, device=device, command=host.stop_command(holder))
+    return problem("other programs", *found)
 
 
 def holder_of_port(host: Host, fc: FcAddress) -> Process | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from protocols.remedies import Fault
 from service.machine.host import Host
 from service.settings.config_files import read_files
 from service.settings.load import SERVICE_CONFIG
@@ -82,4 +83,4 @@ def shadowed(host: Host, answers: SetupChoices) -> Iterator[str]:
         table, _, _ = name.partition(".")
         # The table alone turns the page on.
         if not answers.page if name == "web" else table in answered:
-            yield f"{file} sets {name}, which overrides the answer to setup; remove it there to use the answer"
+            yield Fault.SHADOWED_ANSWER.text(file=file, name=name)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 
+from protocols.remedies import Fault
 from service.cli.doctor.command import diagnose
 from service.cli.setup.answers import (
     GCS_PORT,
@@ -28,7 +29,7 @@ from service.machine.host import Host
 from service.machine.raspberry_pi import pi_model
 from service.settings.addresses import AddressError, parse_fc
 from service.settings.load import SERVICE_STATE
-from service.settings.passphrase import STRONGER, new_passphrase, weakness
+from service.settings.passphrase import new_passphrase, weakness
 from service.web.token import DEFAULT_NAME
 from storage.os_error import reason
 from storage.small_files import read_bounded
@@ -42,7 +43,6 @@ _PASSWORD = re.compile("[ -~]{8,63}")
 _SEARCH_S = 30
 #: The service may have been taken over: a token must not act on root's terminal.
 _TOKEN = re.compile("[!-~]{1,256}")
-_NEEDS_ROOT = "setup needs root: run `sudo naze-bridge setup`, or see the changes with --dry-run"
 _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 
 
@@ -79,7 +79,7 @@ def setup(
     doctor found a problem.
     """
     if not (yes or dry_run or is_root()):
-        fail(_NEEDS_ROOT)  # before the questions
+        fail(Fault.NOT_ROOT.text())  # before the questions
     host = Host(root)
     try:
         fc = None if fc is None else str(parse_fc(fc))
@@ -90,9 +90,9 @@ def setup(
     key = None if key_file is None else secret_line(key_file)
     check_answers(hotspot, password, country, name)  # before the questions
     if hotspot is not None and host.path("/run/systemd/system").exists() and not host.wifi_cards():
-        raise click.UsageError("this machine has no Wi-Fi card for a hotspot")
+        raise click.UsageError(Fault.NO_HOTSPOT_CARD.text())
     if key is not None and new_key:
-        raise click.UsageError("give either --key-file or --new-key")
+        raise click.UsageError(Fault.TWO_KEYS.text())
     earlier = earlier_choices(host)
     if earlier is not None:
         _print_kept(host, earlier.fc, page=earlier.page)
@@ -107,7 +107,7 @@ def setup(
             new_key = click.confirm("Make a key, without which nobody on the network can change missions or settings?")
     if hotspot is not None and password is None:
         if yes or dry_run:
-            raise click.UsageError("a hotspot needs a password: --password-file FILE")
+            raise click.UsageError(Fault.NO_PASSWORD.text())
         password = click.prompt("Its password, 8 characters or more", hide_input=True, confirmation_prompt=True)
     check_answers(hotspot, password, country, name)
     answers = SetupChoices(
@@ -121,7 +121,7 @@ def setup(
     )
     used = answers.key or current_key(host)
     if used and (weak := weakness(used)) is not None:
-        complain(f"warning: the key {weak}; {STRONGER}")
+        complain("warning: " + Fault.WEAK_KEY.text(why=f"the key {weak}"))
     for sentence in shadowed(host, answers):
         complain(f"warning: {sentence}")
     steps = missing_steps(host, answers)
@@ -131,7 +131,7 @@ def setup(
     machine = Machine(host)
     if steps:
         if not is_root():
-            fail(_NEEDS_ROOT)
+            fail(Fault.NOT_ROOT.text())
         if not yes and not click.confirm("Make these changes?", default=True):
             raise click.Abort
         _carry_out([step for step in steps if not step.cuts_network], machine)
@@ -203,7 +203,7 @@ def _carry_out(steps: list[Step], machine: Machine) -> None:
                 machine.carry_out(change)
         except SetupError as error:
             click.echo("failed")
-            fail(f"{error}; earlier changes are kept, and setup can be run again")
+            fail(Fault.FAILED_CHANGE.text(why=error))
         click.echo("done")
 
 
@@ -252,23 +252,22 @@ def token(root: Path) -> None:
     """Show the status page's token, and a QR code that opens the page with it."""
     host = Host(root)
     if not is_root():
-        fail("only root can read the token: sudo naze-bridge token")
+        fail(Fault.TOKEN_NOT_ROOT.text())
     if not page_token(host):
-        fail("the status page has no token yet: switch it on with `sudo naze-bridge setup --page`")
+        fail(Fault.NO_TOKEN.text())
     _print_page(host, next(iter(host.ipv4_addresses()), "localhost"))
 
 
 def check_answers(ssid: str | None, password: str | None, country: str | None, name: str | None) -> None:
     """Refuse answers that cannot be used, each with one sentence (click.UsageError)."""
     if ssid is not None and not (ssid.isprintable() and 0 < len(ssid.encode()) <= _MOST_SSID):
-        wanted = f"1 to {_MOST_SSID} printable characters, of which those outside of ASCII count as 2 to 4"
-        raise click.UsageError(f"{ssid!r} is not a network name: {wanted}")
+        raise click.UsageError(Fault.NOT_AN_SSID.text(text=repr(ssid), most=_MOST_SSID))
     if password is not None and not _PASSWORD.fullmatch(password):
-        raise click.UsageError("a Wi-Fi password has 8 to 63 characters: letters, digits, blanks, signs of ASCII")
+        raise click.UsageError(Fault.NOT_A_PASSWORD.text())
     if country is not None and not re.fullmatch("[A-Za-z]{2}", country):
-        raise click.UsageError(f"{country!r} is not a country code: two letters, such as DE")
+        raise click.UsageError(Fault.NOT_A_COUNTRY.text(text=repr(country)))
     if name is not None and not _HOST_NAME.fullmatch(name):
-        raise click.UsageError(f"{name!r} is not a host name: letters, digits and hyphens, at most 63")
+        raise click.UsageError(Fault.NOT_A_HOST_NAME.text(text=repr(name)))
 
 
 def secret_line(path: Path) -> str:
@@ -276,9 +275,9 @@ def secret_line(path: Path) -> str:
     try:
         lines = read_bounded(path, 1 << 10).decode().removesuffix("\n").removesuffix("\r").split("\n")
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from error
+        raise click.UsageError(Fault.SECRET_UNREADABLE.text(path=path, why=reason(error))) from error
     except UnicodeDecodeError:
-        raise click.UsageError(f"{path} is not a text file") from None  # the error would quote the secret
+        raise click.UsageError(Fault.SECRET_BINARY.text(path=path)) from None  # the error would quote the secret
     if len(lines) != 1 or not lines[0].isprintable() or lines[0].strip() != lines[0] or not lines[0]:
-        raise click.UsageError(f"{path} must hold one line of text, without blanks before and after it")
+        raise click.UsageError(Fault.SECRET_LINES.text(path=path))
     return lines[0]

@@ -64,7 +64,7 @@ def test_a_speed_and_a_height_above_the_sea_are_kept() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("<mission></mission>", "the mission has no waypoints"),
+        ("<mission></mission>", "the file has no items"),
         (f"<mission>{ITEM.replace('WAYPOINT', 'SPIN')}</mission>", "missionitem 1: its action is 'SPIN'; use one of"),
         (
             f"<mission>{ITEM.replace('51.4771', '51,4771')}</mission>",
@@ -78,7 +78,7 @@ def test_a_speed_and_a_height_above_the_sea_are_kept() -> None:
         ("wp 0 1 51 12 15 0 0 165\n", "line 1: 'wp 0 1 51 12 15 0 0 165... is not a waypoint"),
         ("wp 0 1 51 12 15 0 0 0 0\nwp 1 1 51477", "line 2: 'wp 1 1 51477' is not a waypoint"),
         ("wp 0 1 51.4771 0.0012 15 0 0 0 165\n", "line 1: 'wp 0 1 51.4771 0.0012 1... is not a waypoint"),
-        ("wp 0 99 51 12 15 0 0 0 165\n", "line 1: action 99 is unknown; use one of WAYPOINT (1)"),
+        ("wp 0 99 51 12 15 0 0 0 165\n", "line 1: its action is 99; use one of WAYPOINT (1)"),
         ("<svg/>", "this XML holds <svg>"),
     ],
 )

@@ -124,7 +124,7 @@ def test_degrees_are_rounded_to_1e_7(degrees: str, e7: int | None) -> None:
         ([], ["no items"]),
         (["", "  "], ["no items"]),
         ([HEADER], ["no items"]),
-        (["QGC WPL 100", HOME], ["line 2", "12 fields", "version 100 has 13"]),
+        (["QGC WPL 100", HOME], ["line 2", "12 fields", "has 13"]),
         (["QGC WPL 130", HOME], ["line 1", "'QGC WPL 130'", "QGC WPL 110"]),
         (["QGC WPL PB 110", HOME], ["line 1", "'QGC WPL PB 110'"]),
         (["", HOME], ["items without the header", "write QGC WPL 110"]),

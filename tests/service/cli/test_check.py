@@ -216,7 +216,7 @@ def test_an_inavs_saved_settings_decide_about_the_missions(tmp_path: Path) -> No
     assert "WP 1: nav_max_altitude is 20 m, it would not climb to 30 m" in found.stdout
     dump.write_text("NVMAXALT,0\nnav_max_altitude,3000\n")
     assert run("--kind", "inav", "--settings", dump, mission).exit_code == 0
-    for text, wrong in (("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"), ("", "has no settings")):
+    for text, wrong in (("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"), ("", "holds no settings")):
         dump.write_text(text)
         refused = run("--kind", "inav", "--settings", dump, mission)
         assert refused.exit_code == 2

@@ -42,7 +42,7 @@ def test_a_path_gets_the_altitude_and_home_that_are_given(tmp_path: Path) -> Non
     ("target", "args", "words"),
     [
         ("out.kml", [], "name it .waypoints, .plan or .mission"),
-        ("out.waypoints", ["--alt", "30"], "--alt is for a KML, GPX or CSV"),
+        ("out.waypoints", ["--alt", "30"], "leave out --alt, which is for a KML, GPX or CSV"),
         ("out.waypoints", ["--home", "91,0"], "is not a position"),
     ],
 )

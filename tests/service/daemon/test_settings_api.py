@@ -54,7 +54,7 @@ def test_a_backup_has_the_difference_from_the_previous_backup(start: Starter) ->
 
 
 def test_an_emptied_mode_range_reads_none(start: Starter) -> None:
-    link = start.directory / "inav"
+    link = start.directory / "port"
     start.program("inav", "sim", "--kind", "inav", "--link", str(link))
     daemon = start.daemon(str(link))
     daemon.wait()

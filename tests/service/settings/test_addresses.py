@@ -70,7 +70,7 @@ def test_other_programs_notations_are_accepted(text: str, meant: str) -> None:
         ("tcp:192.168.4.20:5760", "write tcpin:0.0.0.0:5760 to listen"),
         ("udpin", "use udpin:0.0.0.0:14550"),
         ("udpout:14550", "needs a host and a port"),
-        ("/dev/ttyUSB0", "add the radio's serial speed, as in /dev/ttyUSB0,57600"),
+        ("/dev/ttyUSB0", "lacks the radio's serial speed; add it, as in /dev/ttyUSB0,57600"),
     ],
 )
 def test_ambiguous_connections_are_explained(text: str, words: str) -> None:

@@ -118,7 +118,7 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
     for options in (["--key-file", str(file)], ["--key-file", str(file), "--new-key"]):
         assert pi.setup("--yes", *options).exit_code == 2
     file.write_text("x\n")
-    assert "either" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
+    assert "exclude each other" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
     assert not pi.key_file.exists()
 
 

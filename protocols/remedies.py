@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The faults of files, links and machines that a person can remove: cause, sentence, action.
+
+tests/service/cli/test_remedies.py carries out each action on a faulty file or machine, and sees the fault gone. The
+table is in this room because every other room may import it.
+"""
+
+from enum import Enum, unique
+
+_MISSION_AS = "save the mission as QGC WPL 110 (.waypoints) or as a QGroundControl plan (.plan)"
+_AGAIN = "save it again from the program that made it"
+_ITSELF = "save the one to be flown by itself"
+_ONE_BOARD = "give the settings of one board"
+FC_FORMS = "use auto, /dev/serial0, /dev/ttyUSB0,57600, tcp:HOST:PORT, udp:HOST:PORT, udpin:0.0.0.0:PORT or sim"
+GCS_FORMS = (
+    "use udpin:0.0.0.0:14550, udpout:HOST:PORT, udpbcast:ADDR:PORT, tcpin:HOST:PORT or, for a radio, /dev/ttyUSB1,57600"
+)
+_BETTER_UART = "printf '\\n[all]\\ndtoverlay=disable-bt\\n' | sudo tee -a {config} && sudo reboot"
+_SET_CLOCK = "sudo date --set 'YEAR-MONTH-DAY HOUR:MINUTE', with the present time"
+
+
+@unique
+class Fault(Enum):
+    """The name is the cause, the value the sentence and the action. Braces are filled in where the fault is found."""
+
+    # Mission files
+    STRANGE_FILE = "no mission begins with {line}", _MISSION_AS
+    OTHER_FILE = "this is {kind}", _MISSION_AS
+    WEB_PAGE = "this is a web page", "download the file itself (on GitHub: Raw)"
+    OTHER_PLAN = "this file holds {kinds}", "give the mission's own file"
+    SETTINGS_FOR_MISSION = (
+        "this file holds settings",
+        "give the mission's own file; `naze-bridge settings restore` takes settings",
+    )
+    NO_HEADER = "this file holds items without the header", "write QGC WPL 110 into a line above them"
+    UNKNOWN_HEADER = "the header is {header}, not 'QGC WPL 110'", "save it as a QGC WPL 110 file (.waypoints)"
+    NO_TITLES = (
+        "this file holds a table without names for latitude and longitude",
+        "name the columns in the first line: latitude,longitude,altitude(m)",
+    )
+    UNKNOWN_XML = "this XML holds <{tag}>", "give a mission of INAV Configurator or mwp, a KML or a GPX"
+    LONG_XML = "this XML is longer than 2 MB", "save only the path to be flown"
+    DOCUMENT_TYPE = "this XML has a document type", "delete the line that begins with <!DOCTYPE"
+    DAMAGED_FILE = "this {kind} is damaged", _AGAIN
+    NO_ITEMS = "the file has no items", _AGAIN
+    TRUNCATED_LINE = "{count} fields where an item has {wanted}, the line is truncated or damaged", _AGAIN
+    DECIMAL_COMMA = (
+        "{text} has a decimal comma",
+        "set the decimal symbol of Windows' region to a point and save it again, or replace the commas by points",
+    )
+    NOT_A_NUMBER = "{what} is {text}, not a number", _AGAIN
+    NOT_WHOLE = "{what} is {text}, not a whole number from 0 to {most}", _AGAIN
+    OUT_OF_RANGE = "{what} is {text}, out of range", _AGAIN
+    NOT_DEGREES = "{what} is {text}", "give it in degrees"
+    UNKNOWN_COMMAND = "command {text} of version 100 is unknown", _AGAIN
+    UNKNOWN_ACTION = "its action is {text}", "use one of {actions}"
+    NOT_A_WP_LINE = "{line} is not a waypoint", "write wp NUMBER ACTION LAT LON ALT P1 P2 P3 FLAG, as `dump` does"
+    MANY_MISSIONS = "the file holds {count} missions", "save one of them as a file of its own"
+    MANY_PATHS = "the file holds {count} {kind}", _ITSELF
+    NO_PATH = "the file holds no path", "draw a path, not an area, and save it again"
+    NO_ALTITUDE = (
+        "the path has no altitude",
+        "save it with altitudes, or set one: `naze-bridge convert {name} MISSION.waypoints --alt METRES`",
+    )
+    NOT_A_PLACE = "{text} is not LON,LAT,ALT", "write decimal points, and blanks only between points"
+    NO_KML = "this zip archive holds no KML", "unpack it and give the mission"
+    UNEQUAL_ROW = "{count} columns, but {wanted} titles", "save the table again, with decimal points"
+    PLAN_VERSION = (
+        "{what} is of version {version}, and only {known} can be read here",
+        "open it in QGroundControl and save it as .plan",
+    )
+    NOT_A_PLAN = "{why}", "save it again from QGroundControl"
+    SURVEY_WITHOUT_ITEMS = "a {kind} carries no plain items", "use waypoints instead of it"
+    FOREIGN_ENDING = "a mission read from the board cannot be written as {ending}", "name the file .waypoints or .plan"
+    UNKNOWN_ENDING = "no format has this ending", "name it .waypoints, .plan or .mission"
+    OWN_ALTITUDES = "it has altitudes of its own", "leave out --alt, which is for a KML, GPX or CSV"
+    # Files of settings
+    MISSION_FOR_SETTINGS = "this file holds a mission", "give a .param file or a dump (`diff all`)"
+    NO_SETTINGS = "this file holds no settings", "give a .param file or a dump (`diff all`)"
+    BAD_COMMAND = "{line} cannot be read", "write {form}"
+    NOT_A_SETTING = "{line} is not a name and a value", "write NAME,VALUE, with a decimal point"
+    NOT_A_NAME = "{name} is not a setting's name", "write NAME,VALUE"
+    NOT_A_VALUE = "{name} is {value}, not a number", "write NAME,VALUE"
+    TWO_VALUES = "{name} is {first} in line {line} and {second} here", "delete one of the lines"
+    MANY_SETTINGS = "the file has over {most} settings, more than any flight controller", _ONE_BOARD
+    LONG_SETTINGS = "the file is longer than 1 MB", _ONE_BOARD
+    # All files
+    UNREADABLE_FILE = "{why}", "check the path and its permissions"
+    FULL_DISK = "{why}", "delete other files there"
+    NO_FILE = "it is not a regular file", "name another file"
+    # Links
+    NOT_AN_FC = "{text} is not a flight controller connection", "{hint}" + FC_FORMS
+    NOT_A_GCS = "{text} is not a ground station connection", "{hint}" + GCS_FORMS
+    NOT_A_BAUD = "{text}: {baud} is not a baud rate", "omit it to auto-detect"
+    NO_RADIO_SPEED = "{text} lacks the radio's serial speed", "add it, as in {path},57600"
+    SENT_OR_HEARD = (
+        "{text}: it is not clear who connects",
+        "write {sending}{kind}in:0.0.0.0:{port} to listen for ground stations",
+    )
+    NO_BRACKETS = "{text} holds an IPv6 address without brackets", "write it in brackets, as in [::1]:5760"
+    NO_PORT = "{text} needs a host and a port", "{forms}"
+    NOT_A_PORT = "{text}: {port} is not a port number", "give one from 1 to 65535"
+    NOT_A_HOST = "{text}: {host} is not a host name", "{forms}"
+    LINK_IN_USE = "{why}", "stop the program that uses it, or choose another port"
+    LINK_ELSEWHERE = "{why}", "this machine has no such address; 0.0.0.0 means all of its addresses"
+    LINK_OF_ROOT = "{why}", "ports below 1024 need root; choose another port"
+    UNKNOWN_HOST = "{why}", "check the name and the network, or give the address in numbers"
+    KEY_FILE_OPEN = "key_file {path} is readable by other users", "run chmod 600 {path}"
+    KEY_FILE_BINARY = "key_file {path} holds no text", "write the passphrase into it, on one line"
+    KEY_FILE_LINES = (
+        "key_file {path} holds more than a line, or none",
+        "write the passphrase into it, on one line, and no more",
+    )
+    # The machine: naze-bridge doctor
+    BAD_CONFIGURATION = "{why}", "correct this, and run doctor again"
+    DEBUG_SOCKET = "/dev/serial0 is the debug socket on a {model}: the header's pins are {header}", "{set_fc}"
+    PORT_UNPLUGGED = "{path} is missing, or no serial port", "plug the flight controller in{other}"
+    PORT_OFF = "{path} is missing, or no serial port", "enable the UART on the header: sudo naze-bridge setup{other}"
+    PORT_OFF_ELSEWHERE = (
+        "{path} is missing, or no serial port",
+        "enable this UART in the board's own boot settings{other}",
+    )
+    NO_PORTS = (
+        "there is no serial port for a flight controller",
+        "plug the flight controller into USB, or name its port: sudo naze-bridge setup --fc /dev/NAME",
+    )
+    PORT_CLOSED_TO_US = (
+        "{device} belongs to the group {group} with {mode}, and not to dialout",
+        "sudo udevadm trigger --settle --subsystem-match=tty; if it stays so, another udev rule decides: {page}",
+    )
+    CONSOLE_RUNS = "{getty} {state}", "sudo systemctl disable --now {getty}.service"
+    CONSOLE_IN_FILE = "{word} is in {file}", "sudo sed -i 's/console={name}[^ ]* *//' {file} && sudo reboot"
+    CONSOLE_OF_KERNEL = "the kernel was started with {word}", "sudo naze-bridge setup && sudo reboot"
+    CONSOLE_ELSEWHERE = (
+        "the kernel was started with {word}",
+        "remove that word from the boot loader's command line, and reboot",
+    )
+    BLUETOOTH_PORT = "{program} has {device} open", "this UART is Bluetooth's, the header has another: {set_fc}"
+    PORT_IN_USE = "{program} has {device} open", "stop it: {command}"
+    NOT_CHECKED = "{fc} was not checked", "fix its port first, then run `sudo naze-bridge doctor`"
+    PORT_NOT_OPEN = "{fc} cannot be opened yet", "see the port, and the daemon's log"
+    BOARD_IN_CLI = "{why}", "after that, run `sudo naze-bridge doctor` again"
+    SILENT_LINE = (
+        "{why}",
+        "is it powered? TX goes to RX, RX to TX, GND to GND; a Naze's USB socket is empty; MSP is on at this UART",
+    )
+    SILENT_NETWORK = (
+        "{why}",
+        "is it on, in this network{ping}, is this its port for MSP, and no other program connected to it?",
+    )
+    WRONG_SPEED = (
+        "no reply on {fc}, but {heard} bytes were received that are no frames",
+        "{baud} baud is probably wrong; let the bridge find the speed: {set_fc}",
+    )
+    NO_FRAMES = (
+        "no reply on {fc}, but {heard} bytes were received that are no frames",
+        "is MSP on at this UART, and nothing else (GPS, receiver)? Is TX on RX only, with GND at both ends?",
+    )
+    MINI_UART = (
+        "{found}; the port is the mini-UART",
+        "{remedy} If all that is right, give the header Bluetooth's UART: " + _BETTER_UART,
+    )
+    UNPATCHED_BOARD = (
+        "this Harakiri has no mission extension, so it stores none",
+        "telemetry works; for missions flash the patch: {page}",
+    )
+    BAD_LINE = (
+        "{damaged} damaged replies in {minutes:.0f} min",
+        "shorten the wires, keep them away from motors and regulators, connect GND at both ends, check 3.3 V",
+    )
+    UNSIGNED_STATION = (
+        "{count} requests on {link} were refused: {why}",
+        "enter the key in the ground station ({page}); sudo naze-bridge setup --new-key makes a new one and shows it",
+    )
+    LATE_STATION = (
+        "{count} requests on {link} were refused: {why}",
+        "set the clocks of the ground station and of the Pi; then: naze-bridge signing reset",
+    )
+    WRONG_IDS = (
+        "{count} messages on {link} were ignored: {why}",
+        "in that program: its own sysid such as 255, and the vehicle's ids, by default 1 and 1, as target",
+    )
+    STORE_FAILS = (
+        "the daemon cannot store missions: {why}",
+        "see disk and missions below; then: sudo systemctl restart naze-bridge",
+    )
+    LATE_CLOCK = "the Pi's clock is {far} {side} {whose}", "sudo date --set '{off_s:+.0f} seconds'"
+    OLD_CLOCK = "it is {time}, years in the past", _SET_CLOCK
+    UNSET_CLOCK = (
+        "{time}, not set by the network since the start",
+        "connect to the Internet once, or before the flight: " + _SET_CLOCK,
+    )
+    ROOT_IN_MEMORY = (
+        "an overlay in memory: settings, missions and logs are lost at power-off",
+        "sudo raspi-config nonint disable_overlayfs && sudo reboot",
+    )
+    READ_ONLY_ROOT = (
+        "read-only: settings and updates cannot be stored",
+        "sudo mount -o remount,rw /; if that fails, the card may be worn out: look at `sudo dmesg`",
+    )
+    STATE_DIR_IS_FILE = "{path} cannot be used: {folder} is a file", "move {folder} away, or name another state_dir"
+    STATE_DIR_NOT_KEPT = "{path} cannot be made: {folder} keeps no files", "name a folder on a disk as state_dir"
+    NOT_ALLOWED = "no permission to {use} {path}", "run doctor with sudo"
+    READ_ONLY_DISK = (
+        "{path} is on a disk that is read-only",
+        "the card may be worn out: look at `sudo dmesg`, then sudo mount -o remount,rw /",
+    )
+    DISK_NEARLY_FULL = "{free} MB free for {path}", "remove unneeded files, such as old logs: ls -l {path}/logs"
+    STORE_UNUSABLE = "{why}", "move it away, and restart the bridge"
+    STORE_DAMAGED = (
+        "{path} is damaged: {why}",
+        "restart the bridge: it sets the file aside and begins a new one (sudo systemctl restart naze-bridge)",
+    )
+    STORE_KEPT_ASIDE = (
+        "a damaged store was kept as {path}",
+        "to save its readable part: sqlite3 {path} .recover; then move it away",
+    )
+    LOW_VOLTAGE = (
+        "the supply's voltage {when}",
+        "use the Pi's own supply or a BEC of 5.1 V and 3 A, with short, thick wires",
+    )
+    WIFI_BLOCKED = (
+        "is switched off (rfkill)",
+        "set the country (sudo raspi-config nonint do_wifi_country DE), then: sudo rfkill unblock wlan",
+    )
+    NO_WIFI = "there is no Wi-Fi card", "connect ground stations by cable, or plug a card in"
+    NO_ADDRESS = "{card} has no address", "join a network, or open a hotspot: {page}"
+    FIREWALL = (
+        "the firewall (nftables) drops packets to {what}",
+        "sudo nft insert rule {chain} {transport} dport {port} accept; also add it to /etc/nftables.conf",
+    )
+    FIREWALL_UFW = "the firewall (ufw) drops packets to {what}", "sudo ufw allow {port}/{transport}"
+    NOT_LISTENING = (
+        "the daemon does not listen on {what}",
+        "look at its log (journalctl -u naze-bridge), and restart it: sudo systemctl restart naze-bridge",
+    )
+    HIDDEN_LISTENER = "{what} is used by another program", "only root sees which: run doctor with sudo"
+    OTHER_LISTENER = "{what} is used by {program}", "stop it: {command}; or use another port"
+    LOST_LISTENER = "{what} is used by a program that is gone", "restart the Pi"
+    NO_KEY = (
+        "{link}: anyone on this network can change missions and settings",
+        "sudo naze-bridge setup --new-key makes a key that changes need, and shows it",
+    )
+    WEAK_KEY = "{why}", "make a random one: sudo naze-bridge setup --new-key"
+    BAD_ZENOH = "{why}", "correct the [zenoh] table or its config_file"
+    # naze-bridge setup, card and token
+    NOT_ROOT = "setup needs root", "run `sudo naze-bridge setup`, or see the changes with --dry-run"
+    TOKEN_NOT_ROOT = "only root can read the token", "run `sudo naze-bridge token`"
+    NO_TOKEN = "the status page has no token yet", "switch it on: `sudo naze-bridge setup --page`"
+    TWO_KEYS = "--key-file and --new-key exclude each other", "give one of them"
+    NO_HOTSPOT_CARD = "this machine has no Wi-Fi card for a hotspot", "plug one in, or omit --hotspot"
+    NO_PASSWORD = "a hotspot needs a password", "give it: --password-file FILE"
+    NOT_AN_SSID = (
+        "{text} is not a network name",
+        "use 1 to {most} printable characters, of which those outside of ASCII count as 2 to 4",
+    )
+    NOT_A_PASSWORD = "this is not a Wi-Fi password", "use 8 to 63 characters: letters, digits, blanks, signs of ASCII"
+    NOT_A_COUNTRY = "{text} is not a country code", "use two letters, such as DE"
+    NOT_A_HOST_NAME = "{text} is not a host name", "use letters, digits and hyphens, at most 63"
+    SECRET_UNREADABLE = "{path} cannot be read: {why}", "check the path and its permissions"
+    SECRET_BINARY = "{path} is not a text file", "write one line of text into it"
+    SECRET_LINES = "{path} does not hold exactly one line", "write one line of text into it, without blanks around it"
+    SHADOWED_ANSWER = "{file} sets {name}, which overrides the answer to setup", "remove it there to use the answer"
+    FAILED_CHANGE = "{why}", "earlier changes are kept: correct this, and run setup again"
+    # naze-bridge check
+    SETTINGS_OF_OTHERS = "--settings is for --kind inav", "omit it: the rules of others need no settings"
+    BAD_SAVED_VALUE = "{why}", "correct that line, or save the settings again"
+    HOME_MISSING = "the list has no home", "--home LAT,LON adds it"
+
+    def __call__(self, **values: object) -> tuple[str, str]:
+        """The sentence and the action with these values."""
+        sentence, action = self.value
+        return sentence.format(**values), action.format(**values)
+
+    def text(self, **values: object) -> str:
+        """Both in one sentence."""
+        return "; ".join(self(**values))
