@@ -5,12 +5,13 @@ docs/status-page.md, "For programs", describes them.
 """
 
 import asyncio
+import ipaddress
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict
 from functools import partial
 from http import HTTPStatus
 
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
@@ -26,15 +27,17 @@ from service.daemon.telemetry_logs import TelemetryLogs
 from service.machine.host import Host
 from service.machine.package import version
 from service.recording.tlog_recorder import TLOG_FOLDER
-from service.settings.web import WebSettings
+from service.settings.addresses import GcsAddress, client_hosts, is_any_address
+from service.settings.web import ListenAddress, WebSettings
 from service.web.access import check_token, refusing, route
-from service.web.connect_help import connect_help, page_urls, qr_code
 from service.web.metrics import CONTENT_TYPE, Metrics
 from service.web.pi_control import PiControl
-from service.web.replies import Turns, begun, json_reply, path_number, text_reply, whole
+from service.web.replies import Turns, json_reply, text_reply, whole
 from service.web.sent_files import MissionWriter, Progress, SentFiles
 from storage.store_error import StoreError
 
+#: Mission Planner's name for the connection type to choose.
+_CONNECTIONS = {"udpin": "UDPCl", "tcpin": "TCP"}
 _LISTED = 50
 _NO_LOG = "There is no such log: it may have been removed."
 
@@ -66,7 +69,6 @@ class Api:
             route("GET", "/api/state", self._state),
             route("GET", "/api/held", self._held),
             route("GET", "/api/connect", self._connect),
-            route("GET", "/connect.svg", self._connect_code),
             route("GET", "/api/missions", self._missions),
             route("GET", "/api/missions/{number}", self._mission),
             route("POST", "/api/missions/{number}/restore", self._restore, check_token),
@@ -127,27 +129,19 @@ class Api:
     async def _connect(self, _request: Request) -> Response:
         return json_reply(connect_help(self._listen, self._daemon.settings.gcs, self._host.ipv4_addresses()))
 
-    async def _connect_code(self, _request: Request) -> Response:
-        urls = page_urls(self._listen, self._host.ipv4_addresses())
-        if not urls:
-            raise HTTPException(
-                HTTPStatus.NOT_FOUND, "Only this machine can open the page: see [web] in the configuration."
-            )
-        return Response(qr_code(urls[0]), media_type="image/svg+xml")
-
     async def _missions(self, _request: Request) -> Response:
         return json_reply(await self._api.list_missions(_LISTED))
 
     async def _mission(self, request: Request) -> Response:
         """A mission as sent and as stored."""
-        number = path_number(request, "number")
+        number = whole(request.path_params["number"])
         async with self._turns.take():
             mission = await self._api.show_mission(number)
             return text_reply(await asyncio.to_thread(lambda: to_json(stored_mission(mission))))
 
     async def _restore(self, request: Request) -> Response:
-        number = path_number(request, "number")
-        return begun(self._writer.begin(f"mission {number}", partial(self._api.restore, number)))
+        number = whole(request.path_params["number"])
+        return self._writer.write(f"mission {number}", partial(self._api.restore, number))
 
     async def _list_settings(self, _request: Request) -> Response:
         return json_reply(await self._api.settings.backups(_LISTED))
@@ -179,10 +173,10 @@ class Api:
             result = await self._api.settings.restore(backup["values"], backup["kind"], "status page", progress)
             return {"ack": ACCEPTED if result["is_saved"] else "", "text": result["text"]}
 
-        return begun(self._writer.begin(f"settings {backup['number']}", write, "settings"))
+        return self._writer.write(f"settings {backup['number']}", write, "settings")
 
     async def _find_settings(self, request: Request) -> Json:
-        return await self._api.settings.backup(path_number(request, "number"))
+        return await self._api.settings.backup(whole(request.path_params["number"]))
 
     async def _reset_signing(self, _request: Request) -> Response:
         return json_reply(await self._api.do({"do": "reset-signing"}, lambda _: None))
@@ -204,3 +198,31 @@ class Api:
 
 def _refusing_logs() -> AbstractContextManager[None]:
     return refusing(OSError, HTTPStatus.SERVICE_UNAVAILABLE, lambda why: f"The logs cannot be read: {why}.")
+
+
+def page_urls(listen: ListenAddress, own: Iterable[str]) -> list[str]:
+    """The page's addresses for other devices; none if only this machine can open it. own: this machine's addresses."""
+    hosts = own if is_any_address(listen.host) else [] if _is_loopback(listen.host) else [listen.host]
+    return [f"http://{ListenAddress(host, listen.port)}/" for host in hosts]
+
+
+def connect_help(listen: ListenAddress, links: Sequence[GcsAddress], own: list[str]) -> Json:
+    """Lines for a ground station: the connection in Mission Planner's words, hosts and port."""
+    stations = [
+        {
+            "connection": _CONNECTIONS[link.kind],
+            "hosts": client_hosts(link.host, own),
+            "port": link.port,
+        }
+        for link in links
+        if link.kind in _CONNECTIONS
+    ]
+    called = [str(link) for link in links if link.kind not in _CONNECTIONS]
+    return {"pages": page_urls(listen, own), "stations": stations, "called": called}
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -61,10 +61,6 @@ class _OfVehicle(Collector):
         self._registry = registry
         self._vehicle = vehicle
 
-    def describe(self) -> list[Metric]:
-        """Not needed: the inner registry checks the names."""
-        return []
-
     def collect(self) -> Iterator[Metric]:
         for family in self._registry.collect():
             family.samples = [
@@ -78,10 +74,6 @@ class _State(Collector):
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon
-
-    def describe(self) -> list[Metric]:
-        """Not needed."""
-        return []
 
     def collect(self) -> Iterator[Metric]:
         yield _gauge("build_info", "The version that runs.", {"version": version()}, 1)

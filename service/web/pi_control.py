@@ -9,7 +9,6 @@ import asyncio
 import ipaddress
 import json
 import os
-import secrets
 from collections.abc import Iterator
 from http import HTTPStatus
 from tempfile import TemporaryFile
@@ -26,9 +25,8 @@ from service.daemon.daemon import Daemon
 from service.machine.helper_socket import MAX_PACKAGE, HelperError, ask_helper, unit_of
 from service.machine.log_setup import recent_lines
 from service.web.access import MAX_FILE, check_token, refusing, route
-from service.web.replies import JSON, begun, json_reply, received_body, whole
+from service.web.replies import JSON, Worker, json_reply, received_body, whole
 from service.web.sent_files import MissionWriter
-from storage.os_error import reason
 
 _MAX_REQUEST = 64 << 10
 _PIECE = 1 << 16
@@ -52,20 +50,13 @@ def check_local(request: Request) -> None:
         raise HTTPException(HTTPStatus.FORBIDDEN, _ELSEWHERE)
 
 
-def check_disarmed(daemon: Daemon) -> None:
-    # A craft that was lost while armed may still fly.
-    if daemon.report().last_heard.armed:
-        raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
-
-
 class PiControl:
-    """One request at a time. The reply is fetched later: it may take longer than a connection lasts."""
+    """One request at a time."""
 
     def __init__(self, daemon: Daemon, writer: MissionWriter) -> None:
         self._daemon = daemon
         self._writer = writer
-        self._task: asyncio.Task[None] | None = None
-        self._job: Json = {"id": None, "done": True}
+        self._worker = Worker("/api/pi", "Another change is being made: wait until it has finished.", "error")
         self._package: IO[bytes] | None = None
 
     def routes(self) -> list[Route]:
@@ -78,14 +69,12 @@ class PiControl:
         ]
 
     async def close(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
+        await self._worker.close()
         self._drop_package()
 
     async def _show(self, _request: Request) -> Response:
         """The request begun last, and the reply."""
-        return json_reply(self._job)
+        return json_reply(self._worker.state or {"id": None, "done": True})
 
     async def _begin(self, request: Request) -> Response:
         """The body is a request to the helper."""
@@ -99,30 +88,13 @@ class PiControl:
         if unit != "look":
             self._check_changeable()
             self._writer.check_idle()
-        if self._task is not None and not self._task.done():
-            raise HTTPException(HTTPStatus.CONFLICT, "Another change is being made: wait until it has finished.")
-        job: Json = {"id": secrets.token_hex(8), "action": action, "done": False}
-        self._job = job
         peer = None if request.client is None else request.client.host
         _log.info("web.pi_request", action=action, peer=peer)
-        self._task = asyncio.get_running_loop().create_task(self._run(asked, job))
-        return begun(str(job["id"]))
 
-    async def _run(self, asked: Json, job: Json) -> None:
-        try:
-            if asked["action"] == "install":
-                job["reply"] = await self._install()
-            else:
-                job["reply"] = await ask_helper(asked)
-        except HelperError as error:
-            job["error"] = str(error)
-        except OSError as error:
-            job["error"] = f"The package cannot be read: {reason(error)}."
-        except Exception:
-            job["error"] = "The daemon failed; see its log."
-            _log.exception("web.failed", path="/api/pi")
-        finally:
-            job["done"] = True
+        async def work(state: Json) -> None:
+            state["reply"] = await (self._install() if action == "install" else ask_helper(asked))
+
+        return self._worker.begin({"action": action}, work)
 
     async def _install(self) -> Json:
         package, self._package = self._package, None
@@ -165,7 +137,9 @@ class PiControl:
             self._package = None
 
     def _check_changeable(self) -> None:
-        check_disarmed(self._daemon)
+        # A craft that was lost while armed may still fly.
+        if self._daemon.report().last_heard.armed:
+            raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
         # A restart would interrupt flashing.
         if self._daemon.fc.is_lent:
             raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)

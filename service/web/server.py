@@ -3,10 +3,8 @@
 
 import asyncio
 import logging
-import secrets
 from collections.abc import Iterator
 from contextlib import suppress
-from http import HTTPStatus
 from pathlib import Path
 
 import structlog
@@ -118,21 +116,15 @@ def _token(daemon: Daemon, settings: WebSettings) -> Token | TokenError:
 
 def _static_files() -> Iterator[tuple[str, Handler]]:
     """Yield path and handler of each of the page's files. They are in memory, so no request waits for the card."""
-    # Of this start: Chromium keeps the headers of its stored copy, too.
-    etag = f'"{secrets.token_hex(8)}"'
     for file in sorted(_FOLDER.iterdir()):
         if file.suffix in _TYPES:
-            yield "/" if file.name == "index.html" else f"/{file.name}", _handler(file, etag)
+            yield "/" if file.name == "index.html" else f"/{file.name}", _handler(file)
 
 
-def _handler(file: Path, etag: str) -> Handler:
+def _handler(file: Path) -> Handler:
     body, kind = file.read_bytes(), _TYPES[file.suffix]
-    # Never cached, so that a page does not mix files of two versions.
-    headers = {"ETag": etag, "Cache-Control": "no-cache"}
 
-    async def serve(request: Request) -> Response:
-        if request.headers.get("if-none-match") == etag:
-            return Response(status_code=HTTPStatus.NOT_MODIFIED, headers=headers)
-        return Response(body, headers=headers, media_type=kind)
+    async def serve(_request: Request) -> Response:
+        return Response(body, media_type=kind)
 
     return serve

@@ -6,13 +6,12 @@ import { STALE_S, age, evidence } from "./state_bar.js";
 
 const PAUSE_MS = 30000; // addresses change when a network comes up
 const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
-let before = null; // the byte counts of the previous state, and the time of its request
 let connectDue = 0, connectShown = "";
 
 export function showValues(state) {
   setText(byId("version"), state.version);
   const { armed, armed_age_s, mode } = state.last_heard;
-  const isOld = armed_age_s > STALE_S, rates = ratesOf(state.traffic);
+  const isOld = armed_age_s > STALE_S;
   byId("vehicle-age").hidden = !isOld;
   if (isOld) setText(byId("vehicle-age"), `Last heard ${age(armed_age_s)} ago.`);
   setClass(byId("values"), isOld ? "old" : "");
@@ -35,13 +34,11 @@ export function showValues(state) {
     ["Heading", known(state.attitude.heading_deg, "°")],
     ["Sensors", state.status.sensors?.join(", ") || "–"],
     ["Sensor errors", known(state.status.i2c_errors), state.status.i2c_errors ? "bad" : ""],
-    ...[...rates].filter(([name]) => name !== "fc").map(([name, rate]) => [name, rate]),
   ]);
   pairs("link", [
     ["Firmware", state.link.flight_controller ?? "not found yet"],
     ["Protocol", state.link.state],
     ["Port", state.link.speed_baud ? `${state.port.address.replace(/,\d+$/, "")}, ${state.link.speed_baud} baud` : state.port.address],
-    ["Line", rates.get("fc") ?? "–"],
     ["Round trip", known(state.link.round_trip_ms, " ms", 1)],
     ["Unanswered", known(state.link.requests_lost)],
     ["Damaged", known(state.link.bad_checksums)],
@@ -73,22 +70,9 @@ function mission(held) {
   return `${held.count} records, ${held.checksum}${held.item === null ? "" : `, ${held.state} at item ${held.item}`}`;
 }
 
-// Bytes per second in and out, by link, since the previous state.
-function ratesOf(traffic) {
-  const last = before;
-  before = { traffic, at: performance.now() };
-  if (last === null) return new Map();
-  const seconds = (before.at - last.at) / 1000;
-  const rate = (name, way) => Math.max(traffic[name][way] - (last.traffic[name]?.[way] ?? 0), 0) / seconds;
-  return new Map(Object.keys(traffic).map((name) => [name, `${size(rate(name, "bytes_received"))} in, ${size(rate(name, "bytes_sent"))} out`]));
-}
-
-const size = (bytes) => (bytes < 1000 ? `${Math.round(bytes)} B/s` : `${(bytes / 1000).toFixed(1)} kB/s`);
-
-// rows: [name, value, class]. Their number may grow.
+// rows: [name, value, class].
 function pairs(id, rows) {
   const all = byId(id);
-  while (all.children.length > rows.length) all.lastElementChild.remove();
   rows.forEach(([name, value, kind = ""], index) => {
     if (index >= all.children.length) all.append(make("div", {}, make("dt"), make("dd")));
     const [title, shown] = all.children[index].children;
@@ -109,8 +93,6 @@ export async function showConnect() {
   connectShown = text;
   const links = help.stations.map(({ connection, hosts, port }) => make("li", {}, make("b", {}, connection), `: host ${hosts.join(" or ")}, port ${port}`));
   const others = help.called.map((address) => make("li", {}, `The Pi itself calls ${address}`));
-  const code = ([address]) => make("img", { src: `connect.svg?${encodeURIComponent(address)}`, class: "qr", width: 164, height: 164, alt: `QR code of ${address}` });
-  const page = help.pages.length ? [make("p", {}, `This page: ${help.pages.join(" or ")}`), code(help.pages)]
-    : [make("p", {}, "Only this machine can open this page: run setup to open it to the network.")];
-  byId("connect").replaceChildren(make("p", {}, "In Mission Planner choose the connection at the top right:"), make("ul", {}, ...links, ...others), ...page);
+  const page = help.pages.length ? `This page: ${help.pages.join(" or ")}` : "Only this machine can open this page: run setup to open it to the network.";
+  byId("connect").replaceChildren(make("p", {}, "In Mission Planner choose the connection at the top right:"), make("ul", {}, ...links, ...others), make("p", {}, page));
 }

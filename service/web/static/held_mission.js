@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The mission on the flight controller: on the map with the craft, from the side, and as a list.
+// The mission on the flight controller: on the map with the craft, and as a list.
 import { ask } from "./daemon.js";
 import { byId, setText } from "./dom.js";
 import { MapView } from "./map_view.js";
-import { listTable, markFlown } from "./mission_tables.js";
-import { showProfile } from "./profile.js";
+import { listTable } from "./mission_tables.js";
 
 const STEP_DEG = 1e-5; // about 1 m
 
@@ -15,10 +14,6 @@ export class HeldMission {
   #trail = []; // of the craft since it was armed, or since the page was opened
   #decisions = []; // of a board that flies its mission, and where
   #wasArmed = null;
-
-  constructor() {
-    byId("profile-block").addEventListener("toggle", () => this.#showProfile());
-  }
 
   // state: of /api/state.
   async show(state) {
@@ -32,17 +27,11 @@ export class HeldMission {
       const text = count ? `${count} records, checksum ${checksum}${isOld ? ", as last read" : ""}` : "No mission.";
       setText(byId("held-text"), count === null ? "The mission has not been read yet." : text);
       byId("held-list").replaceChildren(listTable(items));
-      this.#showProfile();
     }
     const flown = state.mission?.item ?? null, { lat_deg, lon_deg } = state.last_heard; // where the craft was lost
-    markFlown(byId("held-list"), flown);
     this.#follow(state.last_heard);
     this.#note(state.last_heard, state.mission);
     this.#map.show({ items: this.#held.items, path: this.#held.path, flown, position: { ...state.position, lat_deg, lon_deg }, attitude: state.attitude, trail: [...this.#trail], decisions: this.#decisions });
-  }
-
-  #showProfile() {
-    showProfile(byId("profile"), this.#held.path);
   }
 
   #note({ armed, lat_deg: lat, lon_deg: lon }, mission) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A map that is zoomed and panned: with its buttons, the arrow keys, two fingers, the mouse, or Ctrl and the wheel.
+// A map that is zoomed and panned: with its buttons, the arrow keys, two fingers, or the mouse.
 import { make } from "./dom.js";
 import { drawMap } from "./map.js";
 import { TileLayer, tilesVersion } from "./map_tiles.js";
@@ -24,7 +24,6 @@ export class MapView {
     container.append(this.#tiles.element, this.#canvas, this.#tools, this.#tiles.note, this.#note);
     this.#canvas.addEventListener("click", (event) => this.#showMark(event));
     container.addEventListener("keydown", (event) => this.#key(event));
-    this.#canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     this.#canvas.addEventListener("pointerdown", (event) => this.#fingers.set(event.pointerId, [event.clientX, event.clientY]));
     this.#canvas.addEventListener("pointermove", (event) => this.#drag(event));
     for (const end of ["pointerup", "pointercancel", "pointerleave"]) this.#canvas.addEventListener(end, (event) => this.#fingers.delete(event.pointerId));
@@ -88,12 +87,6 @@ export class MapView {
     if (!arrow || this.#camera.zoom <= 1) return;
     event.preventDefault();
     this.#pan(...arrow);
-  }
-
-  #wheel(event) {
-    if (!event.ctrlKey) return; // the wheel alone scrolls the page
-    event.preventDefault();
-    this.#zoomAt(event.deltaY < 0 ? STEP : 1 / STEP, event.clientX, event.clientY);
   }
 
   #drag(event) {

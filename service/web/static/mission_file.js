@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A dropped or chosen mission file: checked by the Pi, drawn, its changes listed first, then written.
+// A chosen mission file: checked by the Pi, drawn, its changes listed first, then written.
 import { post, postWithToken } from "./daemon.js";
 import { byId, make } from "./dom.js";
 import { MapView } from "./map_view.js";
 import { comparison } from "./mission_tables.js";
-import { showProfile } from "./profile.js";
 import { writeForm } from "./write_form.js";
 
 const result = byId("checked"), chooser = byId("file");
@@ -13,18 +12,6 @@ let latest = 0; // the check of an earlier file is ignored once a later one was 
 
 chooser.addEventListener("change", () => chooser.files.length && check(chooser.files[0]));
 chooser.addEventListener("click", () => { chooser.value = ""; }); // the same file again, after an edit
-for (const name of ["dragenter", "dragover"]) document.addEventListener(name, (event) => over(event, true));
-document.addEventListener("dragleave", (event) => { if (event.relatedTarget === null) over(event, false); });
-document.addEventListener("drop", (event) => {
-  over(event, false);
-  if (event.dataTransfer.files.length) check(event.dataTransfer.files[0]);
-});
-
-function over(event, isOver) {
-  if (![...event.dataTransfer.types].includes("Files")) return;
-  event.preventDefault(); // otherwise the browser leaves the page and opens the file
-  document.body.classList.toggle("over", isOver);
-}
 
 // The craft moves on the preview's map, too.
 export function followFile({ position, attitude }) {
@@ -39,7 +26,6 @@ async function check(file) {
   if (turn !== latest) return;
   show(...contents);
   result.focus({ preventScroll: true });
-  if (preview !== null) showProfile(byId("file-profile"), preview.path);
 }
 
 // The result takes the place of the held mission, until it is closed.
@@ -66,7 +52,7 @@ async function checked(file) {
     const verdict = make("p", { class: isRejected ? "bad" : "good" }, verdictText(file.name, list));
     const write = isRejected ? [] : [writeForm("Write this mission", () => postWithToken(`/api/write?${query}`, body))];
     const buttons = make("div", { class: "row" }, ...write, closing);
-    return [verdict, buttons, make("div", { class: "side-by-side" }, make("div", {}, container, make("div", { id: "file-profile" })), make("div", {}, ...comparison(list)))];
+    return [verdict, buttons, make("div", { class: "side-by-side" }, container, make("div", {}, ...comparison(list)))];
   } catch (error) {
     return [make("p", { class: "bad" }, error.message), closing];
   }

@@ -13,14 +13,6 @@ export function listTable(items) {
   return table(["No.", "Command"], rows);
 }
 
-// Marks the row of the item that is flown; seq null: none.
-export function markFlown(container, seq) {
-  for (const row of container.querySelectorAll("tbody tr")) {
-    if (row.cells[0].textContent === String(seq)) row.setAttribute("aria-current", "step");
-    else row.removeAttribute("aria-current");
-  }
-}
-
 // rows: of /api/missions/N; titles: of the left and the right column. Equal rows are shown on request.
 function pairTable(rows, titles) {
   const whole = table(["No.", ...titles], rows.map((row) => pairRow(row, titles)));

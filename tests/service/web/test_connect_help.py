@@ -3,7 +3,7 @@
 
 from service.settings.addresses import GcsAddress
 from service.settings.web import ListenAddress
-from service.web.connect_help import connect_help, page_urls, qr_code
+from service.web.api import connect_help, page_urls
 
 ANY = "0.0.0.0"  # noqa: S104
 OWN = ["10.42.0.1", "192.168.1.7"]
@@ -31,10 +31,3 @@ def test_links_have_mission_planners_names() -> None:
         {"connection": "TCP", "hosts": ["10.42.0.1"], "port": 5760},
     ]
     assert help_["called"] == ["udpout:10.42.0.9:14550"]
-
-
-def test_the_qr_code_is_an_image_without_scripts() -> None:
-    image = qr_code("http://10.42.0.1:8080/")
-    assert b"<svg" in image
-    assert b"<path" in image
-    assert b"script" not in image

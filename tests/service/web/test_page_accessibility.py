@@ -42,7 +42,7 @@ def test_axe_does_not_find_a_violation_in_any_state(
         page.wait_text("#badges", "LOST")
         page.press("#checked .row > button")
         page.wait_text("#held-text", "13 records, checksum 068b9e81, as last read")  # it may still fly it
-        for block in ("#profile-block", "#upload-block", "#missions-block", "#missions details"):
+        for block in ("#upload-block", "#missions-block", "#missions details"):
             page.unfold(block)
         page.wait_text("#missions", "Write mission 2 again")
         for task in ("mission", "fly"):

@@ -85,7 +85,6 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         page.wait_text("#file-map svg", "H")
         # The ten legs that the board flies: to each placed item but the ROI, home, and down.
         assert len(page.all("#file-map .track")) == 10
-        assert len(page.all("#file-profile .point")) == 11
         assert bench.board.records() == before
         page.press("#checked button.write")
         page.enter_token(bench.token)
@@ -95,20 +94,6 @@ def test_a_file_is_checked_drawn_and_written(browsers: Browsers, bench: WebBench
         page.press("#checked .row > button")
         page.wait_text("#held-text", "13 records")
         assert page.errors() == []
-
-
-def test_a_file_can_be_dropped_on_the_page(browsers: Browsers, bench: WebBench) -> None:
-    drop = """
-        const files = new DataTransfer();
-        files.items.add(new File([arguments[0]], 'dropped.waypoints'));
-        document.body.dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: files}));"""
-    with browsers.tab(bench.port) as page:
-        page.open()
-        page.run(drop, EXAMPLE.read_text())
-        page.wait_text("#checked", "dropped.waypoints: 14 items")
-        page.run(drop, "no mission")
-        page.wait_text("#checked .bad", "dropped.waypoints")
-        assert page.all("#checked button.write") == []
 
 
 def test_a_list_that_would_be_rejected_cannot_be_written(browsers: Browsers, bench: WebBench, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import pytest
 from starlette.exceptions import HTTPException
 
-from service.web.replies import Turns, begun, whole
+from service.web.replies import Turns, whole
 
 
 @pytest.mark.parametrize("text", ["", "-1", "1.5", "x", "9" * 30, "2147483648", "²"])
@@ -18,11 +18,6 @@ def test_an_invalid_number_is_not_found(text: str) -> None:
 
 def test_a_number_is_read() -> None:
     assert whole("2147483647") == 2147483647
-
-
-def test_a_write_that_was_begun_has_an_id() -> None:
-    reply = begun("abc")
-    assert (reply.status_code, reply.body) == (202, b'{"id": "abc"}')
 
 
 async def test_long_responses_are_made_one_at_a_time() -> None:
