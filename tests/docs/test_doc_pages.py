@@ -79,7 +79,8 @@ def test_files_in_the_text_exist(page: Path) -> None:
     for span in spans(page):
         folder = span.partition("/")[0]
         is_key = span.startswith("fleet/") and not span.endswith(("/", ".py"))  # of zenoh, under the default prefix
-        if folder and "/" in span and " " not in span and not is_key and (REPOSITORY / folder).is_dir():
+        is_source = folder not in ("", "build", "dist") and (REPOSITORY / folder).is_dir()
+        if is_source and "/" in span and " " not in span and not is_key:
             assert (REPOSITORY / span).exists() or (page.parent / span).exists(), span
         elif re.fullmatch(r"[\w-]+\.(py|c|h|md)", span):
             assert span in files(), span
