@@ -125,20 +125,21 @@ def update_outcome(host: Host) -> str:
 def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
     """Install the package. If the bridge does not run with it, return to the previous. Returns the outcome."""
     was_running = _answers()
-    # Moved first, because it may be the previous.
+    # Moved first, because it may be the previous. naze-bridge-update.service installs it after a power cut.
     installing, kept = package.rename(host.path(f"{_FOLDER}/installing.deb")), host.path(PREVIOUS)
     version, former = version_of(installing, machine), pack_installed(kept, host, machine)
+    outcome = f"Version {version} was installed; before it was {former}."
     try:
         machine.run((*_APT, str(installing)), _TIMEOUT_S)
-        if not was_running or _runs_again(sleep):
-            return f"Version {version} was installed; before it was {former}."
-        why = "the bridge did not start with it"
+        why = "the bridge did not start with it" if was_running and not _runs_again(sleep) else ""
     except SetupError as error:
         why = f"apt failed: {str(error).rpartition(' failed: ')[2]}"  # without its long command
-    finally:
-        installing.unlink()
-    machine.run((*_APT, str(kept)), _TIMEOUT_S)
-    return f"Version {version} was not kept: {why}. This is {former} again."
+    if why:
+        kept.replace(installing)
+        machine.run((*_APT, str(installing)), _TIMEOUT_S)
+        outcome = f"Version {version} was not kept: {why}. This is {former} again."
+    installing.unlink()
+    return outcome
 
 
 def pack_installed(package: Path, host: Host, machine: Machine) -> str | None:
@@ -162,8 +163,9 @@ def pack_installed(package: Path, host: Host, machine: Machine) -> str | None:
         if (file := host.path(f"{_DPKG_INFO}/{_NAME}.{name}")).exists():
             shutil.copy2(file, control / name)
     # Fast rather than small: a Pi Zero would compress for minutes.
-    build = ("dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build", str(root), str(package))
-    machine.run(build, _TIMEOUT_S)
+    packed = package.with_suffix(".new")
+    machine.run(("dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build", str(root), str(packed)), _TIMEOUT_S)
+    packed.replace(package)
     shutil.rmtree(root)
     return version_of(package, machine)
 

@@ -173,5 +173,28 @@ def test_a_failed_installation_is_reverted(tmp_path: Path, host: Host, monkeypat
     assert apt.installed == "1.0"
 
 
+def test_the_package_of_an_interrupted_update_stays_until_it_runs(
+    tmp_path: Path, host: Host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """naze-bridge-update.service installs it at the next start."""
+
+    class Cut(Apt):
+        left = 0
+
+        def run(self, command: Sequence[str], timeout_s: float = 60) -> str:
+            if "apt-get" in command and self.left == 0:
+                raise KeyboardInterrupt
+            self.left -= "apt-get" in command
+            return super().run(command, timeout_s)
+
+    monkeypatch.setattr(packages, "_answers", lambda: True)
+    for left, version in ((0, "2.0"), (1, "1.0")):  # in the installation, and in the way back
+        apt = Cut(host, broken="2.0")
+        apt.left = left
+        with pytest.raises(KeyboardInterrupt):
+            update(new(tmp_path, host), host, apt)
+        assert version_of(host.path(PREVIOUS).with_name("installing.deb"), apt) == version
+
+
 def test_before_the_first_update_there_is_no_outcome(host: Host) -> None:
     assert update_outcome(host) == ""
