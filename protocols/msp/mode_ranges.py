@@ -32,14 +32,18 @@ def range_writes(payload: bytes, number: int, text: str) -> list[bytes] | None:
     wanted = b"".join(ranges)
     if ranges_text(wanted, number) != text:
         raise ValueError(FORM)
-    slots = [*_slots(payload)]
-    own = [slot for slot, held in slots if _is_of(held, number)]
-    free = [slot for slot, held in slots if held[2] >= held[3]]
-    if len(ranges) > len(own) + len(free):
+    slots = []
+    for slot, held in _slots(payload):
+        if _is_of(held, number) and held in ranges:
+            ranges.remove(held)
+        elif _is_of(held, number):
+            slots.append(slot)
+    own = len(slots)
+    slots += [slot for slot, held in _slots(payload) if held[2] >= held[3]]
+    if len(ranges) > len(slots):
         return None
-    ranges += [bytes(RANGE_SIZE)] * (len(own) - len(ranges))
-    before = dict(slots)
-    return [bytes((slot,)) + each for slot, each in zip(own + free, ranges, strict=False) if before[slot] != each]
+    ranges += [bytes(RANGE_SIZE)] * (own - len(ranges))
+    return [bytes((slot,)) + each for slot, each in zip(slots, ranges, strict=False)]
 
 
 def _range(text: str, number: int) -> bytes:

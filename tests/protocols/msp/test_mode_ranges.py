@@ -49,6 +49,10 @@ def test_each_write_is_a_whole_range() -> None:
     assert range_writes(ARM + UNUSED, 1, "AUX2 1300-1700") == [b"\1" + ANGLE]
 
 
+def test_ranges_that_the_board_holds_in_other_places_are_not_written() -> None:
+    assert range_writes(b"\1\1\x10\x20" + b"\1\0\x10\x20", 1, "AUX1 1300-1700; AUX2 1300-1700") == []
+
+
 def test_a_board_with_too_few_ranges_is_not_written() -> None:
     assert range_writes(ARM + ANGLE, 2, "AUX2 1300-1700") is None
 
