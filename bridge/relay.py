@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The ground station's end of a slow link to a vehicle: missions are received and read here, and cross it as a whole.
+"""The ground stations' end of slow links to vehicles: missions are received and read here, and cross them as a whole.
 
 A mission over MAVLink takes a round trip for each item. So the receiver of the bridge itself (bridge/transfers) runs
 next to the ground station, the whole list goes to the vehicle as one command, and the final ack waits for the result.
-Everything else is passed on, with new sequence numbers: stations show gaps as a bad link. Sans-IO.
+Everything else is passed on to the vehicle that it addresses, with new sequence numbers: stations show gaps as a bad
+link. Sans-IO.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -44,7 +45,7 @@ _LOOK_S = 0.02
 _COPY_S = 5.0
 _UNKNOWN = Refusal(MissionResult.DENIED, sentences.VEHICLE_UNKNOWN())
 #: A ground station's messages about the mission that is on a vehicle.
-MISSION_REQUESTS = frozenset(
+_MISSION_REQUESTS = frozenset(
     (
         m.MAVLINK_MSG_ID_MISSION_COUNT,
         m.MAVLINK_MSG_ID_MISSION_ITEM,
@@ -81,111 +82,36 @@ class SendToVehicle:
 
 @dataclass(frozen=True, slots=True)
 class WriteList:
-    """An effect: have the vehicle write a list, () to clear. The reply is passed to `Relay.wrote`."""
+    """An effect: have the vehicle write a list, () to clear. The reply is passed to `Relays.wrote`."""
 
     items: Sequence[MissionItem]
+
+
+@dataclass(frozen=True, slots=True)
+class SameSystem:
+    """An effect: a vehicle is left out, because another has the system id."""
+
+    other: str
+    system: int
 
 
 RelayEffect = Datagrams | SendToVehicle | WriteList
 
 
 class Relay:
-    """One vehicle and its ground stations.
-
-    After each input, carry out the effects, and call `tick` at `due`:
-
-    >>> relay.gcs_received(peer, data, now, datagram=True)
-    >>> for effect in relay.take():
-    ...     match effect:
-    ...         case SendToVehicle(frame): link.write(frame)
+    """One vehicle's end of MAVLink's mission protocol, under its ids, for the ground stations.
 
     Missions are received here once the vehicle's mission is known (`holds`), which shows that it stores missions
     itself. `is_near`: as of Ground.
     """
 
-    def __init__(self, is_near: Callable[[str], bool] = lambda _host: True) -> None:
-        self._effects: list[RelayEffect] = []
-        self._is_near = is_near
-        self._splitter = MavlinkSplitter()
-        self._peers: list[tuple[Peer, bool]] = []
-        self._end: _End | None = None
-        self._held: tuple[tuple[MissionItem, ...] | None, ListIdentity | None] = None, None
-
-    @property
-    def system(self) -> int | None:
-        """The vehicle's system id, or None before it was heard."""
-        return None if self._end is None else self._end.ids[0]
-
-    @property
-    def due(self) -> float:
-        """The time of the next `tick`."""
-        return inf if self._end is None else self._end.due
-
-    def tick(self, now: float) -> None:
-        if self._end is not None:
-            self._end.tick(now)
-
-    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
-        self._peers.append((peer, until_answered))
-        if self._end is not None:
-            self._end.ground.add_default_peer(peer, until_answered=until_answered)
-
-    def remove_default_peer(self, peer: Peer) -> None:
-        self._peers = [each for each in self._peers if each[0] != peer]
-        if self._end is not None:
-            self._end.ground.remove_default_peer(peer)
-
-    def take(self) -> list[RelayEffect]:
-        """What is to be done since the last call."""
-        if self._end is not None and self._end.ground.outbox.outgoing:
-            self._effects.append(self._end.ground.outbox.take())
-        effects, self._effects[:] = [*self._effects], []
-        return effects
-
-    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
-        """Handle bytes from a ground station. Before the vehicle was heard they are passed on."""
-        if self._end is None:
-            self._effects.append(SendToVehicle(data))
-        else:
-            self._end.received(peer, data, now, datagram=datagram)
-
-    def gcs_gone(self, peer: Peer, now: float) -> None:
-        if self._end is not None:
-            self._end.uploads.peer_gone(peer, now)
-            self._end.ground.gone(peer)
-
-    def vehicle_received(self, data: bytes, now: float) -> None:
-        """Pass on frames of the vehicle."""
-        for frame in self._splitter.feed(data):
-            if self._end is None:
-                self._end = _End(frame.sender, self._effects, self._is_near)
-                for peer, until_answered in self._peers:
-                    self._end.ground.add_default_peer(peer, until_answered=until_answered)
-                self._end.holds(*self._held)
-            self._end.vehicle_sent(frame, now)
-
-    def holds(self, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
-        """The vehicle's mission has changed, or None if it is not known."""
-        self._held = items, identity
-        if self._end is not None:
-            self._end.holds(items, identity)
-
-    def wrote(self, result: WriteResult) -> None:
-        """The vehicle has replied to a WriteList."""
-        if self._end is not None:
-            self._end.missions.results.append(result)
-
-
-class _End:
-    """The vehicle's end of MAVLink's mission protocol, under the ids."""
-
-    def __init__(self, ids: tuple[int, int], effects: list[RelayEffect], is_near: Callable[[str], bool]) -> None:
+    def __init__(self, ids: tuple[int, int], is_near: Callable[[str], bool]) -> None:
         self.ids = ids
-        self._effects = effects
+        self.effects: list[RelayEffect] = []
         self._targets = {(system, component) for system in (0, ids[0]) for component in (0, ids[1])}
         self.ground = Ground(*ids, _ignore, lambda _station, _now: None, {}, LinkAccess(), is_near)
         self._runner = Runner(lambda _effect: None)
-        self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, effects)
+        self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, self.effects)
         self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1))
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
         uploads = self.uploads
@@ -239,7 +165,7 @@ class _End:
                 return
             sender = self.ground.heard(station, frame, frame.sender, now)
             if sender is not None and not self._is_answered(sender, frame, now):
-                self._effects.append(SendToVehicle(frame.raw))
+                self.effects.append(SendToVehicle(frame.raw))
 
     def _item(self, convert: Callable[[Message], MissionItem], sender: Sender, message: Message, now: float) -> None:
         self.uploads.item(sender, convert(message), now)
@@ -352,3 +278,131 @@ class _Unchecked(ListCheck):
 
 def _ignore(_event: BridgeEvent) -> None:
     """The vehicle logs its own events."""
+
+
+class Relays:
+    """Vehicles by name. Ground stations know them by system id alone.
+
+    After each input, carry out the effects, and call `tick` at `due`:
+
+    >>> relays.gcs_received(peer, data, now, datagram=True)
+    >>> for name, effect in relays.take():
+    ...     match effect:
+    ...         case SendToVehicle(frame): links[name].write(frame)
+
+    `is_near`: as of Ground.
+    """
+
+    def __init__(self, is_near: Callable[[str], bool] = lambda _host: True) -> None:
+        self._is_near = is_near
+        #: None until it is heard.
+        self._vehicles: dict[str, Relay | None] = {}
+        self._held: dict[str, tuple[tuple[MissionItem, ...] | None, ListIdentity | None]] = {}
+        self._left_out: list[tuple[str, SameSystem]] = []
+        self._peers: dict[Peer, bool] = {}
+        self._splitters: dict[Peer, MavlinkSplitter] = {}
+
+    def add(self, name: str) -> None:
+        self._vehicles[name] = None
+
+    def remove(self, name: str) -> None:
+        """Forget a vehicle, for example because it has left."""
+        self._vehicles.pop(name, None)
+        self._held.pop(name, None)
+
+    @property
+    def heard(self) -> set[str]:
+        """The vehicles that were heard, without those left out."""
+        return set(self._heard)
+
+    @property
+    def _heard(self) -> dict[str, Relay]:
+        return {name: relay for name, relay in self._vehicles.items() if relay is not None}
+
+    @property
+    def due(self) -> float:
+        """The time of the next `tick`."""
+        return min((relay.due for relay in self._heard.values()), default=inf)
+
+    def tick(self, now: float) -> None:
+        for relay in self._heard.values():
+            if now >= relay.due:
+                relay.tick(now)
+
+    def add_default_peer(self, peer: Peer, *, until_answered: bool = False) -> None:
+        self._peers[peer] = until_answered
+        for relay in self._heard.values():
+            relay.ground.add_default_peer(peer, until_answered=until_answered)
+
+    def remove_default_peer(self, peer: Peer) -> None:
+        self._peers.pop(peer, None)
+        for relay in self._heard.values():
+            relay.ground.remove_default_peer(peer)
+
+    def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> None:
+        """Handle bytes from a ground station: frames for one vehicle, and those for all, such as heartbeats."""
+        frames = (MavlinkSplitter() if datagram else self._splitters.setdefault(peer, MavlinkSplitter())).feed(data)
+        for relay in self._heard.values():
+            own = [frame.raw for frame in frames if self._addresses(frame, relay)]
+            if own:
+                relay.received(peer, b"".join(own), now, datagram=datagram)
+
+    def gcs_gone(self, peer: Peer, now: float) -> None:
+        self._splitters.pop(peer, None)
+        for relay in self._heard.values():
+            relay.uploads.peer_gone(peer, now)
+            relay.ground.gone(peer)
+
+    def vehicle_received(self, name: str, data: bytes, now: float) -> None:
+        """Pass on whole frames of a vehicle."""
+        for frame in MavlinkSplitter().feed(data):
+            if name not in self._vehicles:
+                return
+            relay = self._vehicles[name] or self._begin(name, frame.sender)
+            if relay is not None:
+                relay.vehicle_sent(frame, now)
+
+    def _begin(self, name: str, ids: tuple[int, int]) -> Relay | None:
+        other = next((each for each, relay in self._heard.items() if relay.ids[0] == ids[0]), None)
+        if other is not None:
+            self.remove(name)
+            self._left_out.append((name, SameSystem(other, ids[0])))
+            return None
+        relay = self._vehicles[name] = Relay(ids, self._is_near)
+        for peer, until_answered in self._peers.items():
+            relay.ground.add_default_peer(peer, until_answered=until_answered)
+        relay.holds(*self._held.get(name, (None, None)))
+        return relay
+
+    def holds(self, name: str, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
+        """The vehicle's mission has changed, or None if it is not known."""
+        if name in self._vehicles:
+            self._held[name] = items, identity
+        if (relay := self._vehicles.get(name)) is not None:
+            relay.holds(items, identity)
+
+    def wrote(self, name: str, result: WriteResult) -> None:
+        """The vehicle has replied to a WriteList."""
+        if (relay := self._vehicles.get(name)) is not None:
+            relay.missions.results.append(result)
+
+    def take(self) -> list[tuple[str, RelayEffect | SameSystem]]:
+        """What is to be done since the last call, by vehicle."""
+        taken: list[tuple[str, RelayEffect | SameSystem]] = []
+        for name, relay in self._heard.items():
+            if relay.ground.outbox.outgoing:
+                relay.effects.append(relay.ground.outbox.take())
+            taken += [(name, effect) for effect in relay.effects]
+            relay.effects.clear()
+        taken += self._left_out
+        self._left_out.clear()
+        return taken
+
+    def _addresses(self, frame: MavlinkFrame, relay: Relay) -> bool:
+        system, _ = frame.target
+        if len(self._vehicles) == 1:
+            return True
+        if system == 0:
+            # A mission belongs to one vehicle: to clear those of all could only be a mistake.
+            return frame.msgid not in _MISSION_REQUESTS
+        return relay.ids[0] == system

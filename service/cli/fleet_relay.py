@@ -9,8 +9,7 @@ import click
 import zenoh
 
 from bridge.gcs.station import Datagrams, Peer
-from bridge.relay import SendToVehicle, WriteList
-from bridge.relays import Relays, SameSystem
+from bridge.relay import Relays, SameSystem, SendToVehicle, WriteList
 from fleet.enrolment import SYSIDS
 from fleet.session import FleetError
 from fleet.tables import in_few_words
@@ -18,6 +17,8 @@ from fleet.vehicle import BridgeId, bridge_of
 from payloads.keys import ALIVE, full
 from service.cli.vehicle_relay import VehicleRelay
 from service.links.gcs_links import GcsLink, open_link
+from service.machine.host import Host
+from service.machine.own_networks import OwnNetworks
 from service.machine.threads import post
 from service.settings.addresses import GcsAddress
 
@@ -62,7 +63,7 @@ class FleetRelay:
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._session, self._prefix, self._bridges, self._is_all = session, prefix, bridges, is_all
-        self._relays = Relays()
+        self._relays = Relays(OwnNetworks(Host()))
         self._vehicles: dict[str, VehicleRelay] = {}
         self._clash = ""
         self._is_started = False
@@ -95,9 +96,10 @@ class FleetRelay:
     def add(self, name: str) -> None:
         """Connect a vehicle."""
         if name not in self._vehicles:
-            vehicle = VehicleRelay(self._session, self._prefix, name, self._bridges, self._sent, self._input_changed)
-            self._vehicles[name] = vehicle
-            self._relays.add(name, vehicle.relay)
+            self._relays.add(name)
+            self._vehicles[name] = VehicleRelay(
+                self._session, self._prefix, name, self._bridges, self._relays, self._sent, self._input_changed
+            )
 
     def close(self) -> None:
         self._tokens.undeclare()  # type: ignore[no-untyped-call]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Sequence
 
 import zenoh
 
-from bridge.relay import Relay, WriteResult
+from bridge.relay import Relays, WriteResult
 from fleet.payload import decode, part, text, whole
 from fleet.session import send_query
 from fleet.vehicle import BridgeId, replier
@@ -14,8 +14,6 @@ from payloads.keys import CLEAR, MAVLINK_IN, MAVLINK_OUT, MISSION_CURRENT, STATU
 from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import write_qgc_wpl
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
-from service.machine.host import Host
-from service.machine.own_networks import OwnNetworks
 from service.machine.threads import post
 
 #: The router reports a vehicle's subscription within this time.
@@ -27,7 +25,7 @@ _MAX_WAITING = 64
 
 
 class VehicleRelay:
-    """Must be made on a running event loop. If the vehicle takes commands, `relay` receives the missions as a whole.
+    """Must be made on a running event loop. If the vehicle takes commands, `relays` receive the missions as a whole.
 
     `bridges`: those that are alive. `sent`: called with the vehicle's name and frames, or none after a result.
     `on_input`: called with its name and False if it does not accept frames, or is gone; with True when it does again.
@@ -39,13 +37,14 @@ class VehicleRelay:
         prefix: str,
         name: str,
         bridges: Container[BridgeId | None],
+        relays: Relays,
         sent: Callable[[str, bytes], None],
         on_input: Callable[[str, bool], None],
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._session, self._prefix, self._name, self._bridges = session, prefix, name, bridges
         self._sent, self._on_input = sent, on_input
-        self.relay = Relay(OwnNetworks(Host()))
+        self._relays = relays
         self._input = session.declare_publisher(
             self._key(MAVLINK_IN.suffix),
             congestion_control=zenoh.CongestionControl.DROP,
@@ -106,7 +105,7 @@ class VehicleRelay:
         data = decode(sample) or {}
         count, checksum, items = whole(data, "count"), text(data, "checksum"), _items(part(data, "items"))
         identity = None if count is None or checksum is None else ListIdentity(count, int(checksum, 16))
-        post(self._loop, self.relay.holds, items, identity)
+        post(self._loop, self._relays.holds, self._name, items, identity)
 
     def send(self, frame: bytes) -> None:
         """Send a frame to the vehicle."""
@@ -130,7 +129,7 @@ class VehicleRelay:
         send_query(self._session, self._key(command.suffix), reply, _WRITE_TIMEOUT_S, payload)
 
     def _wrote(self, result: WriteResult) -> None:
-        self.relay.wrote(result)
+        self._relays.wrote(self._name, result)
         self._sent(self._name, b"")
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Datagrams, Peer
-from bridge.relay import Relay, SendToVehicle, WriteList, WriteResult
+from bridge.relay import Relays, SendToVehicle, WriteList, WriteResult
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
@@ -30,7 +30,8 @@ class Bench:
     def __init__(self) -> None:
         self.to_vehicle: list[bytes] = []
         self.written: list[Sequence[MissionItem]] = []
-        self.relay = Relay()
+        self.relays = Relays()
+        self.relays.add("owl")
         self.now = 100.0
         self.frames: list[tuple[int, Message]] = []
         self._writer, self._vehicle = FrameWriter(255, 190), FrameWriter(*VEHICLE)
@@ -38,21 +39,21 @@ class Bench:
     def send(self, message: Message) -> list[Message]:
         """Send a message of the ground station; the relay's answers."""
         before = len(self.frames)
-        self.relay.gcs_received(PEER, self._writer.frame(pack(message), 2), self.now, datagram=True)
+        self.relays.gcs_received(PEER, self._writer.frame(pack(message), 2), self.now, datagram=True)
         self.run(0.01)
         return [answer for _, answer in self.frames[before:]]
 
     def heartbeat(self, *, armed: bool = False) -> None:
         """Of the vehicle."""
         message = m.MAVLink_heartbeat_message(2, 3, 81 | (128 * armed), 0, 3, 3)
-        self.relay.vehicle_received(self._vehicle.frame(pack(message), 2), self.now)
+        self.relays.vehicle_received("owl", self._vehicle.frame(pack(message), 2), self.now)
         self._take()
 
     def run(self, seconds: float) -> None:
         end = self.now + seconds
-        while (due := max(self.relay.due, self.now)) <= end:
+        while (due := max(self.relays.due, self.now)) <= end:
             self.now = due + 1e-4
-            self.relay.tick(self.now)
+            self.relays.tick(self.now)
         self.now = end
         self._take()
 
@@ -66,7 +67,7 @@ class Bench:
         return next((each for _, each in reversed(self.frames) if each.get_type() == kind), None)
 
     def _take(self) -> None:
-        for effect in self.relay.take():
+        for _, effect in self.relays.take():
             match effect:
                 case SendToVehicle(sent):
                     self.to_vehicle.append(sent)
@@ -89,7 +90,7 @@ def connected(*, stores: bool = True) -> Bench:
     bench = Bench()
     bench.heartbeat()
     if stores:
-        bench.relay.holds((), NONE)
+        bench.relays.holds("owl", (), NONE)
     bench.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     bench.to_vehicle.clear()
     return bench
@@ -105,7 +106,7 @@ def test_a_list_crosses_the_link_as_a_whole_and_is_acknowledged_when_the_vehicle
     assert bench.last("MISSION_ACK") is None
     stored = (PLAN[0], *(replace(item, p1=1.0) for item in PLAN[1:]))
     finding = Finding(1, "p1", 0.0, 1, "0 not allowed", 16, News.NOTICE)
-    bench.relay.wrote(WriteResult(MissionResult.ACCEPTED, "Mission verified: 146 records", [finding], stored))
+    bench.relays.wrote("owl", WriteResult(MissionResult.ACCEPTED, "Mission verified: 146 records", [finding], stored))
     bench.run(0.5)
     ack = bench.last("MISSION_ACK")
     assert ack is not None
@@ -122,7 +123,7 @@ def test_a_list_crosses_the_link_as_a_whole_and_is_acknowledged_when_the_vehicle
 def test_the_vehicles_refusal_is_the_final_ack() -> None:
     bench = connected()
     bench.upload(PLAN[:5])
-    bench.relay.wrote(WriteResult(MissionResult.DENIED, "Rejected, WP 3: too far"))
+    bench.relays.wrote("owl", WriteResult(MissionResult.DENIED, "Rejected, WP 3: too far"))
     bench.run(0.5)
     ack = bench.last("MISSION_ACK")
     assert ack is not None

@@ -4,8 +4,7 @@
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Datagrams, Peer
-from bridge.relay import Relay, SendToVehicle, WriteList
-from bridge.relays import Relays, SameSystem
+from bridge.relay import Relays, SameSystem, SendToVehicle, WriteList
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MavlinkSplitter
@@ -32,9 +31,8 @@ class Bench:
 
     def join(self, name: str, system: int) -> None:
         self.sent[name] = []
-        relay = Relay()
-        self.relays.add(name, relay)
-        relay.holds((), ListIdentity(0, 0))
+        self.relays.add(name)
+        self.relays.holds(name, (), ListIdentity(0, 0))
         heartbeat = FrameWriter(system, 1).frame(pack(m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)), 2)
         self.relays.vehicle_received(name, heartbeat, self.now)
 
