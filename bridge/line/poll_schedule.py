@@ -30,11 +30,8 @@ _ASSUMED_BAUD = 115200
 _BESIDE_MISSIONS = 0.2
 #: No poll gets slower than this.
 _SLOWEST_S = 5.0
-#: Polls that other programs ask for: the shortest interval, and the smallest part of telemetry's share for them.
-_FOLLOWED_S = 0.1
-_FOLLOWED_SHARE = 0.1
-#: They ask for it until they were silent for this long.
-_FOLLOWED_FOR_S = 3.0
+#: The interval of polls that other programs ask for, until they were silent for this long.
+_FOLLOWED_S, _FOLLOWED_FOR_S = 0.1, 3.0
 #: A reply is current for one interval, or for this long.
 _CURRENT_S = 1.0
 #: Together with one that is due, polls are sent that will be due within this part of their interval, and this time:
@@ -117,6 +114,10 @@ class _Slot:
         return self.refusals >= _REFUSALS
 
     @property
+    def is_followed(self) -> bool:
+        return self.followed_until > -inf
+
+    @property
     def backoff(self) -> float:
         """The factor for the interval while it is not answered."""
         return float(2 ** min(max(self.misses - _TOLERATED_MISSES, 0), _MAX_DOUBLINGS))
@@ -177,7 +178,6 @@ class PollSchedule:
         self._budget = 0.0
         self._least_cost = 0.0
         self._line_scale = 1.0
-        self._followed_s = inf
         self._unfollowed_at = inf  # when programs stop asking for a poll
         self._quality = 1.0
         self._free_at = 0.0
@@ -213,7 +213,7 @@ class PollSchedule:
         slot = self._slots.get(command)
         if slot is None or frame != slot.poll.frame:
             return None
-        is_new = slot.followed_until == -inf
+        is_new = not slot.is_followed
         slot.followed_until = now + _FOLLOWED_FOR_S
         self._unfollowed_at = min(self._unfollowed_at, slot.followed_until)
         if is_new:
@@ -289,7 +289,7 @@ class PollSchedule:
         if now >= self._unfollowed_at:
             for slot in self._slots.values():
                 slot.followed_until = slot.followed_until if now < slot.followed_until else -inf
-            self._unfollowed_at = min((slot.followed_until for slot in self._followed()), default=inf)
+            self._unfollowed_at = min((s.followed_until for s in self._slots.values() if s.is_followed), default=inf)
             self._fit()
         asked = self._slots.values() if link.requests_lost != self._lost_before else ()
         self._lost_before = link.requests_lost
@@ -306,28 +306,19 @@ class PollSchedule:
             for slot in first:
                 slot.due = min(slot.due, now)  # asked again at once: a single loss does not make a value stale
 
-    def _followed(self) -> list[_Slot]:
-        return [slot for slot in self._slots.values() if slot.followed_until > -inf and not slot.is_unknown]
-
     def _fit(self) -> None:
         """Scale the requested rates to the line."""
         for slot in self._slots.values():
-            wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s)
+            followed_s = _FOLLOWED_S if slot.is_followed else inf
+            wanted_s = min(self._wanted.get(slot.poll.command, inf), slot.poll.needed_s, followed_s)
             slot.wanted_s = inf if slot.is_unknown else wanted_s
-        followed = self._followed()
-        budget = self._budget * (1 - _FOLLOWED_SHARE) if followed else self._budget
-        self._followed_s = inf
         self._line_scale = 1.0
-        if self._bytes_per_s(1.0) > budget:
+        if self._bytes_per_s(1.0) > self._budget:
             step, self._line_scale = 0.5, _LEAST_SCALE
             for _ in range(_HALVINGS):
-                if self._bytes_per_s(self._line_scale + step) <= budget:
+                if self._bytes_per_s(self._line_scale + step) <= self._budget:
                     self._line_scale += step
                 step /= 2
-        if followed:
-            slower = sum(slot.cost for slot in followed if self._interval(slot, self._line_scale) > _FOLLOWED_S)
-            left = max(self._budget - self._bytes_per_s(self._line_scale), self._budget * _FOLLOWED_SHARE)
-            self._followed_s = max(slower / left, _FOLLOWED_S)
         self._set_intervals()
 
     def _bytes_per_s(self, scale: float) -> float:
@@ -339,10 +330,7 @@ class PollSchedule:
 
     def _present_interval(self, slot: _Slot) -> float:
         scale = self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
-        interval_s = self._interval(slot, self._line_scale * scale)
-        if slot.followed_until == -inf or slot.is_unknown:
-            return interval_s
-        return min(interval_s, self._followed_s / scale * slot.backoff)
+        return self._interval(slot, self._line_scale * scale)
 
     def _interval(self, slot: _Slot, scale: float, backoff: float | None = None) -> float:
         is_status = slot.poll.command is Msp.STATUS

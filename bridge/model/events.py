@@ -132,19 +132,9 @@ class GcsText(BridgeEvent):
 
 
 class ShareRefused(BridgeEvent):
-    """A program's change was refused. At debug level if it repeats."""
+    """A program's request was refused, or got no answer in time. At debug level within 30 s of the one before."""
 
     name_in_log = "share.refused"
-    level: Level = "warning"
-    program: str
-    command: str
-    why: str
-
-
-class ShareUnanswered(BridgeEvent):
-    """A program's request got no answer in time. At debug level if it repeats."""
-
-    name_in_log = "share.unanswered"
     level: Level = "warning"
     program: str
     command: str

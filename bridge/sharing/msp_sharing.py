@@ -19,7 +19,7 @@ from bridge.gcs.ground import Ground
 from bridge.line.conversation import Conversation, LinkLost, Receive, Send, ask_armed
 from bridge.line.msp_link import MspLink
 from bridge.missions.mission_service import MissionService
-from bridge.model.events import Emit, Level, ShareRefused, ShareUnanswered
+from bridge.model.events import Emit, Level, ShareRefused
 from bridge.settings.board_settings import BoardSettings
 from bridge.sharing.program import Program, WaitingRequest
 from bridge.voice import sentences
@@ -38,8 +38,6 @@ _PAUSE_AFTER_LOSS_S = 0.5
 _LOOK_AGAIN_S = 0.1
 #: Refused changes, and requests without a reply, are reported this often: programs repeat their attempts.
 _REPORTS = Rate(1 / 30, 1)
-#: Reasons that are counted apart.
-_MAX_REASONS = 64
 #: SET_RTC and COMMON_SET_TZ: mwp sets an INAV's clock each time it connects, and continues after an error.
 _CLOCK = frozenset((247, 0x1002))
 _ARMED, _NO_REPLY = "armed", "no reply from the flight controller"
@@ -60,8 +58,7 @@ class MspSharing:
     #: When the line has carried the last forwarded request and the reply.
     _free_at: float = 0.0
     _stopped: bool = False
-    _refusals: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
-    _losses: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
+    _reports: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     refused: Counter[str] = field(default_factory=Counter)
     #: The time of the next `tick`, or infinity while no request waits.
     due: float = inf
@@ -78,7 +75,7 @@ class MspSharing:
             return
         taken = program.take(data, now) if self._total.has(now) else None
         if taken is None:
-            self._count("too many requests")
+            self.refused["too many requests"] += 1
             return
         self._total.spend(taken)
         if program.waiting:
@@ -95,7 +92,7 @@ class MspSharing:
             self._answer(program, now)
             for request in tuple(program.waiting):
                 if request.until <= now and request is not self._forwarded:
-                    self._give_up(program, request, now)
+                    self._drop(program, request, self._obstacle() or _NO_REPLY, now)
         if self._forwarded is None and self._free_at <= now:
             self._forward_next(now)
         deadlines = [request.until for program in self._programs for request in program.waiting if request.until > now]
@@ -121,7 +118,7 @@ class MspSharing:
             armed = self._session.vehicle.armed
             why = refusal(request, right, link, may_write=program.may_write, armed=armed)
             if why:
-                self._refuse(program, request, right.name, why, now)
+                self._refuse(program, request, why, now)
                 if program not in self._programs:
                     return
                 continue
@@ -190,49 +187,35 @@ class MspSharing:
                 if isinstance(reply, MspFrame):
                     program.answer(request, reply)
                 elif reply == _ARMED:
-                    self._refuse(program, request, right.name, _ARMED, at)
+                    self._refuse(program, request, _ARMED, at)
                 else:
                     # It may have been carried out, so it is not repeated.
-                    self._give_up(program, request, at)
+                    self._drop(program, request, self._obstacle() or _NO_REPLY, at)
             self.tick(at)
 
         conversation = _carry(request, frame_size(request.frame.command, right.reply), controller.arm_bit)
         self._missions.runner.start(conversation, done, now, in_background=True)
 
-    def _refuse(self, program: Program, request: WaitingRequest, name: str, why: str, now: float) -> None:
+    def _refuse(self, program: Program, request: WaitingRequest, why: str, now: float) -> None:
         if request.frame.command in _CLOCK:
             program.answer(request, MspFrame(Direction.ERROR, request.frame.command))
-            return
-        level = self._level(self._refusals, name, why, now)
-        self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
-        if level == "warning":
+        elif name := self._drop(program, request, why, now):
             self._ground.say(sentences.PROGRAM_REFUSED(program.host, name, why))
-        self._disconnect(program, request)
 
-    def _give_up(self, program: Program, request: WaitingRequest, now: float) -> None:
-        why = self._obstacle() or _NO_REPLY
+    def _drop(self, program: Program, request: WaitingRequest, why: str, now: float) -> str:
+        """End a request without a reply, and the connection. The request's name if pilots may be told."""
         controller = self._session.state.controller
-        right = None if controller is None else right_of(request.frame, controller)
-        name = f"command {request.frame.command}" if right is None else right.name
-        level = self._level(self._losses, name, why, now)
-        self._emit(ShareUnanswered(level=level, program=program.name, command=name, why=why))
-        self._disconnect(program, request)
-
-    def _disconnect(self, program: Program, request: WaitingRequest) -> None:
-        """Without a connection, only this request does not get a reply."""
+        name = f"command {request.frame.command}" if controller is None else right_of(request.frame, controller).name
+        self.refused[why] += 1
+        is_reported = self._reports.take(now)
+        level: Level = "warning" if is_reported else "debug"
+        self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         program.waiting.remove(request)
         if program.close is not None:
             self._programs.remove(program)
             program.waiting.clear()
             program.close()
-
-    def _level(self, reports: TokenBucket, command: str, why: str, now: float) -> Level:
-        """Count a request that got no reply. The level of the log line."""
-        self._count(f"{command}: {why}")
-        return "warning" if reports.take(now) else "debug"
-
-    def _count(self, what: str) -> None:
-        self.refused[what if what in self.refused or len(self.refused) < _MAX_REASONS else "other requests"] += 1
+        return name if is_reported else ""
 
 
 def _first_unknown(waiting: list[WaitingRequest]) -> WaitingRequest | None:

@@ -51,7 +51,7 @@ def test_a_lost_reply_does_not_lose_the_link(command: int, is_damaged: bool) -> 
         world.run(0.9)
     assert world.events("fc.lost") == []
     assert program.closed_at is not None
-    (event,) = world.events("share.unanswered")
+    (event,) = world.events("share.refused")
     assert event.facts["why"] == "no reply from the flight controller"
 
 

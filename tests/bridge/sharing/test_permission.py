@@ -94,7 +94,7 @@ def test_in_flight_other_requests_do_not_reach_the_line() -> None:
     sent = {frame.command for _, _, data in world.written for frame in MspParser().feed(data)}
     assert not sent & {PID, INAV_MIXER, NAME}
     assert [program.closed_at for program in programs] == [pytest.approx(asked_at + 3, abs=0.3)] * 3
-    assert {event.facts["why"] for event in world.events("share.unanswered")} == {"armed"}
+    assert {event.facts["why"] for event in world.events("share.refused")} == {"armed"}
 
 
 def test_a_waiting_read_is_forwarded_once_the_craft_has_landed() -> None:

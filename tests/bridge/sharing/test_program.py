@@ -211,7 +211,7 @@ def test_a_program_that_waits_too_long_is_disconnected() -> None:
     assert outcome == []
     assert program.closed_at == pytest.approx(asked_at + 3, abs=0.3)
     assert program.replies == over_udp.replies == []
-    assert {event.facts["why"] for event in world.events("share.unanswered")} == {"a mission transfer is running"}
+    assert {event.facts["why"] for event in world.events("share.refused")} == {"a mission transfer is running"}
 
 
 def test_without_a_flight_controller_requests_wait_for_it() -> None:
