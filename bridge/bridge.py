@@ -121,7 +121,7 @@ class Bridge:
         )
         routes = self._routes = Routes(ground)
         runner = self._runner = Runner(emit)
-        port = Port(config.speeds, owner.autopilot, config.profiles, runner, routes.from_autopilot)
+        port = Port(config.speeds, config.profiles, runner, routes.from_autopilot)
         session = self._session = FcSession(port, emit, incidents, self._controller_changed, config.flight)
         #: The flight controller's readings, which are kept when it is lost.
         self.vehicle = port.vehicle

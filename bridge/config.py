@@ -8,7 +8,7 @@ from typing import Annotated
 
 from bridge.controllers.harakiri.rules import TAKEOFF_MAX_M
 from bridge.controllers.table import PROFILES
-from bridge.fc.profile import Autopilot, Profile
+from bridge.fc.profile import Profile
 from bridge.gcs.rights import LinkAccess
 from bridge.model.craft import FlightMemory
 from bridge.model.settings import MemoryOfThisRun, SettingsMemory
@@ -34,10 +34,6 @@ class BridgeSettings:
         range(2, 256),
         "Maximum take-off altitude of a mission, metres, 2..255; a higher one is lowered to it.",
     ] = TAKEOFF_MAX_M
-    autopilot: Annotated[
-        Autopilot,
-        'The sender of MAVLink on the port: "auto" detects it, "harakiri" is translated, "other" is passed through.',
-    ] = Autopilot.AUTO
     pass_through: Annotated[
         PassThroughRule,
         "Messages for an autopilot in pass-through from links with neither key_file nor writers: "

@@ -114,7 +114,7 @@ class Status:
 class Link:
     """The link between the bridge and its flight controller."""
 
-    state: Annotated[str, "no port, searching, identifying, MSP, MAVLink or FrSky"]
+    state: Annotated[str, "no port, searching, identifying, MSP or MAVLink"]
     flight_controller: Annotated[str | None, "its name"] = None
     speed_baud: Annotated[int | None, "of the port"] = None
     round_trip_ms: Annotated[float | None, "from a request to its reply"] = None

@@ -20,7 +20,6 @@ from bridge.model.craft import ARM_BOX, Airframe
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
 from bridge.voice import sentences
-from bridge.voice.happening import Sentence
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, MspFrame, request
@@ -91,19 +90,7 @@ class Spoken(Enum):
     MAVLINK = "MAVLink"
     #: An autopilot that represents itself to ground stations. The bridge does not send anything in its name.
     OTHER_MAVLINK = "MAVLink, passed through"
-    FRSKY = "FrSky"
     CLI = "command line"
-
-
-class Autopilot(Enum):
-    """A setting: the sender of MAVLink on the port. AUTO: known from MSP on this port, or from the ids.
-
-    HARAKIRI is translated, OTHER is passed through.
-    """
-
-    AUTO = "auto"
-    HARAKIRI = "harakiri"
-    OTHER = "other"
 
 
 #: Fills the vehicle from the payload of a reply, heard at a time.
@@ -160,7 +147,6 @@ class Profile:
     restarts_after_calibration: it reboots by itself when a calibration is done. calibrates_six_positions: its
     accelerometer needs one request in each of six positions.
     arming_blockers: the known reasons that prevent arming at a time; None if not heard yet.
-    notice: a warning for the pilot while this profile is active.
     """
 
     name: str
@@ -187,7 +173,6 @@ class Profile:
     restarts_after_calibration: bool = False
     arming_blockers: Callable[[Vehicle, float], tuple[str, ...] | None] = lambda _vehicle, _now: ()
     calibrates_six_positions: bool = False
-    notice: Sentence[()] | None = None
 
 
 @dataclass(frozen=True, slots=True)

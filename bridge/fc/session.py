@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
-from bridge.fc.states.msp import Identifying, Polling
-from bridge.fc.states.mute import Cli, Frsky
+from bridge.fc.states.msp import Cli, Identifying, Polling
 from bridge.fc.states.searching import Searching
 from bridge.model.craft import FlightMemory
 from bridge.model.events import Emit, FcFound, FcInCommandLine, FcLost, FcSensed, PortLost
@@ -22,12 +21,11 @@ _MSP: _Next = {Identified: Polling, **_MAVLINK, Spoken.CLI: Cli, **_LOST}
 #: State -> event or search result -> next state. Any other event in a state is a bug.
 TRANSITIONS: Mapping[type[State], _Next] = {
     Closed: {PortOpened: Searching},
-    Searching: {Spoken.MSP: Identifying, Spoken.FRSKY: Frsky, **_MAVLINK, Spoken.CLI: Cli, **_LOST},
+    Searching: {Spoken.MSP: Identifying, **_MAVLINK, Spoken.CLI: Cli, **_LOST},
     Identifying: _MSP,
     Polling: _MSP,
     HarakiriMavlink: _LOST,
     PassThrough: _LOST,
-    Frsky: _LOST,
     Cli: _LOST,
 }
 

@@ -14,15 +14,16 @@ from math import inf
 from operator import attrgetter
 
 from bridge.line.conversation import Send
-from protocols.frsky import FRSKY_SPEED
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, is_clean, request
 
 #: Harakiri's ring, less one heartbeat (25 bytes) that it may send unprompted in AUTOSENSE, and a margin.
 MAX_OUTSTANDING_BYTES = 224
-#: The limit at the speed of FrSky telemetry, which an armed Harakiri puts into the same ring: 13 bytes eight times a
-#: second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while the replies leave it.
+#: The speed of FrSky telemetry, which a Harakiri armed with tele_prot 1 puts into the same ring, and the limit there:
+#: 13 bytes eight times a second, up to 85 with GPS, barometer and time. Two of these frames may join the ring while
+#: the replies leave it.
+FRSKY_SPEED = 9600
 _OUTSTANDING_BESIDE_FRSKY = 140
 #: After a longer stall, pending requests are assumed lost: the board was reset or lost power.
 _LONGEST_STALL_S = 3.0

@@ -35,7 +35,6 @@ class Source(Enum):
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
-    FRSKY = "FrSky"
 
 
 class Fix(IntEnum):

@@ -121,7 +121,7 @@ class OwnVehicle:
         self._beat(now, everyone)
         self._send_due(self._rows.get(None, ()), now)
         if self.readiness.state is ReadyState.CALIBRATING or not self._session.vehicle.fresh(Health, now, _SILENT_S):
-            # No reading triggers it now: the flight controller is lost, or sends FrSky telemetry.
+            # No reading triggers it now: the flight controller is lost.
             self._send_due([(_SYS_STATUS, None), (_EXTENDED_SYS_STATE, None)], now)
         self._announce_home(now)
         self._inform_newcomers(everyone, now)

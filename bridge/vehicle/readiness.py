@@ -122,9 +122,7 @@ class CraftReadiness:
             # It represents itself.
             self.state, self.reasons = ReadyState.UNKNOWN, ()
             return
-        if profile.notice is not None and controller.name != before:
-            self._ground.say(profile.notice())
-        elif was_lost and silent_since is not None and was_found:
+        if was_lost and silent_since is not None and was_found:
             # It replaces the warning on Mission Planner's HUD.
             self._ground.say(sentences.BACK(now - silent_since))
         elif controller.name != before and not is_switch:

@@ -25,7 +25,6 @@ NOT_FOUND = Sentence(_WARNING, "No flight controller found: {}", "check power, w
 LOST = Sentence(_WARNING, "Flight controller lost: silent for {:.0f} s", _SECONDS)
 BACK = Sentence(_WARNING, "Flight controller back after {:.0f} s", _SECONDS)
 IN_COMMAND_LINE = Sentence(_WARNING, "Board in its CLI: type exit, or unplug it")
-FRSKY = Sentence(_WARNING, "FrSky while armed: no attitude, position or mode")
 FAILSAFE = Sentence(_CRITICAL, "Failsafe: the flight controller has taken over")
 FAILSAFE_ENDED = Sentence(_NOTICE, "Failsafe ended: the pilot has control")
 LEFT_MISSION = Sentence(_WARNING, "{}", "Returns: 199 m from the border of geozone 62")

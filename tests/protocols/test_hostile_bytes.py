@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-from bridge.fc.port_listener import GpsWatch
-from protocols.frsky import FrskyWatch
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.frame import MAX_REPLY, MspParser
@@ -35,8 +33,6 @@ PATTERNS = {
     "NMEA with wrong checksums": b"$GPGGA,*00",
     "UBX headers": b"\xb5\x62\x01\x01\xff\x00",
     "long UBX headers": b"\xb5\x62\x01\x01\x00\x04",
-    "FrSky marks": b"^",
-    "FrSky values": b"^\x01\x00\x00",
 }
 
 
@@ -63,8 +59,6 @@ def msp(data: bytes, size: int) -> None:
 PARSERS: dict[str, Callable[[bytes, int], None]] = {
     "MAVLink": mavlink,
     "MSP": msp,
-    "FrSky": lambda data, size: in_pieces(FrskyWatch().feed)(data, size),
-    "GPS": lambda data, size: in_pieces(GpsWatch().feed)(data, size),
     "echo": lambda data, size: in_pieces(EchoWatch().feed)(data, size),
 }
 

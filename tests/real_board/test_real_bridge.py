@@ -7,8 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.fc.states.mavlink import HarakiriMavlink
-from bridge.fc.states.msp import Identifying, Polling
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli, Identifying, Polling
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.emulated_naze.board import EmulatedNaze
 from simulator.emulated_naze.image import Image

@@ -73,7 +73,6 @@ TRUE: dict[str, Callable[[Board], bool]] = {
     **dict.fromkeys(("NOT_FOUND",), lambda board: not board.was_on),
     **dict.fromkeys(("LOST",), lambda board: board.was_on and not board.is_on),
     **dict.fromkeys(("FOUND", "BACK"), lambda board: board.is_on),
-    "FRSKY": lambda board: board.kind == "frsky" and board.is_armed,
     "READY": lambda board: board.may_arm,
     "NOT_READY": lambda board: not board.may_arm,
     **dict.fromkeys(("NO_BOARD_TO_COMMAND", "NO_LINK", "NO_SETTINGS"), lambda board: not board.is_on),

@@ -193,8 +193,7 @@ class TestLostFlightController:
             assert glance.armed
             assert not glance.safe
             assert not glance.failsafe
-        # No value is read from FrSky telemetry, which the pilot must know.
-        assert set(screens.mission_planner.line.values(began)) <= {"FrSky while armed: no attitude, position or mode"}
+        assert set(screens.mission_planner.line.values(began)) == set()
 
 
 class TestArming:

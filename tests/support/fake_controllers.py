@@ -10,21 +10,12 @@ from math import inf
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from protocols.msp.frame import Direction, MspFrame, MspParser
-from simulator.naze.board import SimulatedNaze
 
 HARAKIRI_CAPABILITY = 0x80000000
 
 
 def ident(version: int, capability: int) -> bytes:
     return struct.pack("<BBBI", version, 3, 0, capability)
-
-
-class DeafWhileArmed(SimulatedNaze):
-    """FrSky with the RX wire cut while armed: no replies."""
-
-    def receive(self, data: bytes, now: float) -> None:
-        if not self.armed:
-            super().receive(data, now)
 
 
 class QuietLine:

@@ -25,8 +25,7 @@ from bridge.controllers.table import PROFILES
 from bridge.effects import PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import Profile
 from bridge.fc.states.mavlink import MavlinkLine
-from bridge.fc.states.msp import Polling
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli, Polling
 from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams, Peer

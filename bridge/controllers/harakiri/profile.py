@@ -16,7 +16,7 @@ from bridge.fc.profile import FlightController, Interview, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.model.craft import FlightMode, airframe
-from bridge.model.missions import ARMED, Refusal
+from bridge.model.missions import Refusal
 from bridge.model.vehicle import Health, Mode, Sticks, Vehicle
 from bridge.voice import sentences
 from protocols.mission_item import MissionResult
@@ -110,11 +110,4 @@ MAVLINK = Profile(
     mavlink_readings=HarakiriReadings,
     mavlink_sender=(1, 1, 200),  # baseflight_mavlink.c. Other autopilots send as component 1
 )
-FRSKY = Profile(
-    "Harakiri in FrSky mode",
-    _FAMILY,
-    Spoken.FRSKY,
-    missions=ARMED,
-    notice=sentences.FRSKY,
-)
-PROFILES = (PATCHED, UNPATCHED, MAVLINK, FRSKY)
+PROFILES = (PATCHED, UNPATCHED, MAVLINK)

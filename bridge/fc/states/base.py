@@ -13,12 +13,12 @@ from math import inf
 from typing import ClassVar
 
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
-from bridge.fc.profile import Autopilot, FlightController, Profile, Spoken
+from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
 from bridge.line.runner import Runner
 from bridge.model.ground_track import GroundTrack
-from bridge.model.vehicle import FlightState, Source, Vehicle
+from bridge.model.vehicle import Vehicle
 from bridge.voice.happening import Happening
 from protocols.mavlink.frame import MavlinkFrame
 
@@ -79,7 +79,6 @@ class Port:
     """
 
     speeds: Sequence[int | None]
-    autopilot: Autopilot
     profiles: Sequence[Profile]
     runner: Runner
     on_mavlink: Callable[[list[bytes], list[bytes]], None]
@@ -108,8 +107,6 @@ class Port:
 
         A board met over MSP stays in its family unless it sends MAVLink 2. Otherwise the sender decides.
         """
-        if self.autopilot is not Autopilot.AUTO:
-            return Spoken.MAVLINK if self.autopilot is Autopilot.HARAKIRI else Spoken.OTHER_MAVLINK
         family = self.met_family if frame.version == 1 else None
         sender = frame.version, *frame.sender
         ours = (profile for profile in self.profiles if profile.spoken is Spoken.MAVLINK)
@@ -125,10 +122,6 @@ class Port:
         self.vehicle.track = GroundTrack()
         self.vehicle.airframe = controller.airframe or self.vehicle.airframe
         self.vehicle.version = controller.version or self.vehicle.version
-
-    def hear_armed(self, source: Source, now: float) -> None:
-        """Only an armed craft sends this."""
-        self.vehicle.hear(FlightState(now, source, True))
 
 
 class State(ABC):

@@ -7,7 +7,7 @@ from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController
 from bridge.fc.states.base import Event, Found, Lost, Port, State
 from bridge.line.msp_link import PROBE, byte_time_s
-from bridge.model.vehicle import Source
+from bridge.model.vehicle import FlightState, Source
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkSplitter, kinds
 from protocols.msp.frame import MspParser
@@ -109,7 +109,7 @@ class HarakiriMavlink(MavlinkLine):
         assert event.heard is not None
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
             # Unprompted, it sends more than heartbeats only while armed.
-            port.hear_armed(Source.MAVLINK, now)
+            port.vehicle.hear(FlightState(now, Source.MAVLINK, True))
         heard = [event.heard.raw]
         self._telemetry.take(heard, kinds(heard), now)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of an MSP line: the board is being identified, or polled."""
+"""The states of an MSP line: the board is being identified, or polled, or in its command line."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,11 @@ from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import MSP_SILENCE_S, FlightController, Interview, NoAnswer, Profile, Spoken
 from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
 from bridge.line.conversation import Conversation, LinkLost
-from bridge.line.msp_link import MspLink, PendingReplies
-from protocols.frsky import FRSKY_SPEED
+from bridge.line.msp_link import FRSKY_SPEED, PROBE, MspLink, PendingReplies
+from bridge.voice.sentences import IN_COMMAND_LINE
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
-from protocols.msp.frame import MspFrame
+from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
+from protocols.msp.frame import Direction, MspFrame, MspParser
 
 #: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
 #: MAVLink is torn: before the change is believed, this many bytes may pass without a whole frame.
@@ -21,6 +22,9 @@ _FOREIGN_SIZE = 16
 _IDENTIFY_TIMEOUT_S = 15.0
 #: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
 _ARMED_SPEEDS = (57600, FRSKY_SPEED)
+#: A person may be typing into the command line: nothing is sent until it has been quiet for this long, and then once in
+#: this time. Two requests without an echo: the board is restarting, or has no power.
+_QUIET_S, _NO_ECHO_S = 3.0, 7.0
 
 
 class MspLine(State):
@@ -172,6 +176,49 @@ class Polling(MspLine):
         is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
         silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
         return min(self.link.due, self.port.polls.due(self.link), silent_at)
+
+
+class Cli(State):
+    """The board was left in its command line, or a terminal program opened it.
+
+    Sends only complete requests without a line end, and DEL, which erases them: so nothing precedes the pilot's `exit`,
+    and nothing is executed. A reply or a heartbeat shows that it is back.
+    """
+
+    name = "command line"
+    trouble = IN_COMMAND_LINE()
+
+    def __init__(self, port: Port, event: Found, now: float) -> None:
+        super().__init__(port, event, now)
+        self._heard_at = self._sent_at = now
+        self._begin_listening()
+        port.output.append(RUB_OUT_LINE)
+
+    def receive(self, data: bytes, now: float) -> Event | None:
+        self._heard_at = now
+        answers = [frame for frame in self._msp.feed(data) if frame.direction is not Direction.REQUEST]
+        return Lost("it has left its command line") if answers or self._mavlink.feed(data) else None
+
+    def tick(self, now: float) -> Event | None:
+        if now >= self._heard_at + _NO_ECHO_S:
+            return Lost("its command line no longer echoes")
+        if now >= self._ask_at:
+            self._sent_at = now
+            self._begin_listening()
+            self.port.output.append(typed_and_rubbed_out(PROBE))
+        return None
+
+    @property
+    def due(self) -> float:
+        return min(self._ask_at, self._heard_at + _NO_ECHO_S)
+
+    @property
+    def _ask_at(self) -> float:
+        return max(self._heard_at, self._sent_at) + _QUIET_S
+
+    def _begin_listening(self) -> None:
+        # An echoed header hides what follows it from the parser.
+        self._msp, self._mavlink = MspParser(), MavlinkSplitter()
 
 
 class _ForeignBytes:

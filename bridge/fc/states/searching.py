@@ -5,7 +5,7 @@ A disarmed Harakiri sends MAVLink heartbeats until it receives something, and an
 speak MAVLink only. So the search listens for both, but probes for MSP and prefers it.
 
 Each visit to a speed first only listens, then probes as well. An MSP reply is confirmed by a second one. Evidence is
-two equal replies to our own probes, a heartbeat with plausible fields, or two MAVLink frames of one sender. Noise
+two equal replies to our own probes, an autopilot's heartbeat, or two MAVLink frames of one autopilot. Noise
 produces none of them (test_autosense_noise.py). A board that echoes our probes is in its command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
 test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
@@ -18,8 +18,7 @@ from itertools import cycle, islice
 from bridge.fc.profile import Spoken
 from bridge.fc.states.base import Event, Found, Lost, Port, PortOpened, State
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE, PendingReplies, byte_time_s
-from protocols.frsky import FRSKY_SPEED, FrskyWatch
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_plausible_heartbeat
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat
 from protocols.msp.command_line import EchoWatch
 from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser
@@ -35,8 +34,8 @@ _PROBE_INTERVAL_S = 0.15
 _QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
-#: Harakiri sends three and more every 125 ms. In noise each has a chance of 1 in 1024: one of four ids, and a mark.
-_FRSKY_EVIDENCE = 6
+#: Of autopilots, and of a Harakiri. A radio sends as another, and so does the ground station at its other end.
+_AUTOPILOT_COMPIDS = (1, 200)
 #: A command line's echo of one probe: `$M<dd`.
 _ECHO_SIZE = 5
 
@@ -64,7 +63,6 @@ class _Visit:
     answer: MspFrame | None = None
     heartbeat: MavlinkFrame | None = None
     last_mavlink: MavlinkFrame | None = None
-    frsky: FrskyWatch = field(default_factory=FrskyWatch)
     echo: EchoWatch = field(default_factory=EchoWatch)
 
 
@@ -92,8 +90,6 @@ class Searching(State):
             self._msp_frame(msp_frame, now)
         for mavlink_frame in self._visit.mavlink.feed(data):
             self._mavlink_frame(mavlink_frame, now)
-        if self.speed == FRSKY_SPEED:
-            self._visit.frsky.feed(data)
         self._visit.echo.feed(data)
         if not self.found and self._visit.echo.is_echo():
             self._conclude(Spoken.CLI, "it echoes our probes")
@@ -104,10 +100,7 @@ class Searching(State):
         if self.found:
             return self.found
         if now >= visit.ends:
-            if visit.frsky.values_in_a_row >= _FRSKY_EVIDENCE:
-                # A Harakiri that has not heard anything sends the heartbeat as well.
-                self._conclude(Spoken.FRSKY, f"{visit.frsky.values_in_a_row} FrSky values in a row")
-            elif visit.heartbeat is not None:
+            if visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
                 why = f"heard {sender}, no answer to {visit.probes} MSP probes"
                 self._conclude(self.port.mavlink_of(visit.heartbeat), why)
@@ -177,7 +170,8 @@ class Searching(State):
         if before is None:
             # On a slow line a Harakiri's stream is torn, and whole frames are rare.
             visit.ends = max(visit.ends, now + _FULL_VISIT_S)
-        if is_plausible_heartbeat(frame) or (before is not None and before.sender == frame.sender):
+        is_repeated = before is not None and before.sender == frame.sender and frame.compid in _AUTOPILOT_COMPIDS
+        if is_repeated or is_autopilot_heartbeat(frame):
             visit.heartbeat = frame
             if not visit.probes and visit.answer is None:
                 visit.phase_ends = now

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli
 from bridge.vehicle.incoming import OWN_IDS
 from payloads.mission_data import Json
 from protocols.mavlink.signing import Check

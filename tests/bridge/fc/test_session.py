@@ -9,13 +9,11 @@ import pytest
 from bridge.fc.session import TRANSITIONS
 from bridge.fc.states.base import Closed, State
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
-from bridge.fc.states.mute import Cli, Frsky
+from bridge.fc.states.msp import Cli
 from bridge.fc.states.searching import Searching
-from simulator.board.options import Faults, SimOptions, TelemetryProtocol
-from tests.support.fake_controllers import DeafWhileArmed, MavlinkOnly
+from simulator.board.options import SimOptions, TelemetryProtocol
+from tests.support.fake_controllers import MavlinkOnly
 from tests.support.world import World
-
-ARMED_IN = {HarakiriMavlink: TelemetryProtocol.MAVLINK, Frsky: TelemetryProtocol.FRSKY_9600}
 
 
 class BugError(Exception):
@@ -25,10 +23,10 @@ class BugError(Exception):
 def world_of(state: type[State]) -> World:
     if state is PassThrough:
         return World(peer=MavlinkOnly())
-    faults = Faults()
-    board = DeafWhileArmed(SimOptions(tele_prot=ARMED_IN.get(state, TelemetryProtocol.MSP)), faults)
-    world = World(faults=faults, peer=board)
-    if state in ARMED_IN:
+    world = World(
+        SimOptions(tele_prot=TelemetryProtocol.MAVLINK if state is HarakiriMavlink else TelemetryProtocol.MSP)
+    )
+    if state is HarakiriMavlink:
         world.wait_ready()
         world.faults.armed = True
     elif state is Cli:

@@ -9,9 +9,7 @@ from bridge.model.craft import Airframe, airframe
 from bridge.model.vehicle import Vehicle
 from bridge.vehicle import vehicle_messages as make
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
-from simulator.naze.board import SimulatedNaze
 from tests.bridge.vehicle.test_vehicle_messages import BETAFLIGHT, HARAKIRI, INAV, at, status, with_replies
-from tests.support.fake_controllers import DeafWhileArmed
 from tests.support.screens import Screens
 from tests.support.world import GroundStation, World
 
@@ -114,8 +112,7 @@ PROTOCOLS = [TelemetryProtocol.MSP, TelemetryProtocol.MAVLINK_57600, TelemetryPr
 def flying(protocol: TelemetryProtocol, boxes: int = BARO_AND_ANGLE) -> tuple[World, GroundStation, Screens]:
     """A craft armed 30 s ago, 25 m and more from where it was armed."""
     faults = Faults(boxes=boxes)
-    board = DeafWhileArmed if protocol is TelemetryProtocol.FRSKY_9600 else SimulatedNaze
-    world = World(faults=faults, peer=board(SimOptions(tele_prot=protocol), faults))
+    world = World(SimOptions(tele_prot=protocol), faults)
     world.wait_ready()
     station = GroundStation(world)
     connect(station)

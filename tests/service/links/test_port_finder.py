@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`fc = "auto"`: finding the flight controller among GPS receivers, radios and ports in use, on pseudo-terminals."""
+"""`fc = "auto"`: finding the flight controller among radios and ports in use, on pseudo-terminals."""
 
 import asyncio
 import json
-import os
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -22,8 +21,6 @@ from simulator.naze.board import SimulatedNaze
 from tests.support.inside import inside
 from tests.support.pi_with_ports import Pi
 from tests.support.programs import until_async
-
-NMEA = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n"
 
 
 @asynccontextmanager
@@ -53,37 +50,27 @@ async def test_the_port_of_a_radio_is_not_searched(pi: Pi) -> None:
         await finder.open()
 
 
-async def test_the_flight_controller_is_found_after_a_gps_receiver(pi: Pi, tmp_path: Path) -> None:
+async def test_the_flight_controllers_port_is_remembered(
+    pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.links.port_finder._SEARCH_S", 1.0)
     pi.usb("ttyUSB0", "1-1")
     pi.usb("ttyUSB1", "1-2")
     pi.terminal("ttyUSB0")
     naze = plug_naze(pi, "ttyUSB1")
     state = tmp_path / "state"
     state.mkdir()
-
-    async def gps() -> None:
-        while True:
-            os.write(pi.wires["ttyUSB0"], NMEA)
-            await asyncio.sleep(0.2)
-
-    talking = asyncio.create_task(gps())
     async with running(pi, state) as (daemon, jobs):
         await until_async(lambda: inside(daemon.bridge).session.state.controller, "the flight controller")
-        status = jobs.status()
-        assert status["port"] == "/dev/ttyUSB1"
-        assert status["ports_passed_over"] == ["/dev/ttyUSB0: a GPS receiver (NMEA) was heard there"]
-        assert pi.sent_to("ttyUSB0") == b""
+        assert jobs.status()["port"] == "/dev/ttyUSB1"
         await until_async((state / "ports.json").exists, "the memory")
-    talking.cancel()
-    kept = json.loads((state / "ports.json").read_text())
-    assert kept["flight_controller"] == "usb 1-2 10c4:ea60"
-    # After a restart its port is tried first, and a GPS receiver is remembered even while silent.
+    assert pi.sent_to("ttyUSB0")
+    assert json.loads((state / "ports.json").read_text()) == {"flight_controller": "usb 1-2 10c4:ea60"}
     async with running(pi, state) as (daemon, jobs):
         await until_async(lambda: inside(daemon.bridge).session.state.controller, "the flight controller")
         assert jobs.status()["ports_passed_over"] == []
-        naze.unplug()
-        await until_async(lambda: jobs.status()["ports_passed_over"], "the other port's turn")
         assert pi.sent_to("ttyUSB0") == b""
+    naze.unplug()
 
 
 async def test_a_silent_port_is_skipped(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,5 +114,5 @@ async def test_a_board_that_need_not_answer_is_on_the_last_or_only_port(pi: Pi, 
     pi.terminal("ttyUSB1")
     with pytest.raises(PortError, match="one of /dev/ttyUSB0, /dev/ttyUSB1"):
         finder.port_of_silent_board()
-    (tmp_path / PORTS_FILE).write_text('{"flight_controller": "usb 1-2 10c4:ea60", "others": {}}')
+    (tmp_path / PORTS_FILE).write_text('{"flight_controller": "usb 1-2 10c4:ea60"}')
     assert PortFinder(pi, tmp_path).port_of_silent_board() == "/dev/ttyUSB1"

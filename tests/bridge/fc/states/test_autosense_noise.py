@@ -12,7 +12,6 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.fc.profile import Autopilot
 from bridge.fc.states.base import Port, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
@@ -33,7 +32,7 @@ ALPHABETS = {
 
 
 def begin(*speeds: int, good: tuple[int, ...] = ()) -> Searching:
-    port = Port(speeds, Autopilot.AUTO, (), Runner(lambda _effect: None), lambda _frames, _kinds: None)
+    port = Port(speeds, (), Runner(lambda _effect: None), lambda _frames, _kinds: None)
     port.good_speeds.extend(good)
     return Searching(port, PortOpened(), 0.0)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli
 from bridge.fc.states.searching import Searching
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import request

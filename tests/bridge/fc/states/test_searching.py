@@ -160,6 +160,17 @@ def test_an_empty_heartbeat_is_ignored() -> None:
     assert reports_armed(world) is True
 
 
+def test_a_radio_with_a_ground_station_behind_it_is_not_a_flight_controller() -> None:
+    world = World(peer=QuietLine())
+    radio, station = messages.MAVLink(None, 51, 68), messages.MAVLink(None, 255, 190)
+    for _ in range(30):
+        world.receive_from_fc(bytes(messages.MAVLink_radio_status_message(0, 0, 100, 0, 0, 0, 0).pack(radio)))
+        world.receive_from_fc(bytes(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)))
+        world.receive_from_fc(bytes(messages.MAVLink_request_data_stream_message(1, 1, 0, 4, 1).pack(station)))
+        world.run(0.5)
+    assert world.events("fc.found") == []
+
+
 @pytest.mark.parametrize("peer", [QuietLine, Loopback])
 def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())

@@ -4,7 +4,7 @@
 import pytest
 
 from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli
 from payloads.mission_data import Json
 from service.cli.doctor.flight_controller import check_flight_controller, check_running
 from service.daemon.client import ControlError
