@@ -11,11 +11,11 @@ subclasses Stopped when the bridge is stopping and OutOfTime when the conversati
 >>> runner.start(is_disarmed(1), on_done, now)
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.missions import ArrivedMission, Outcome
 from protocols.mission_item import ListIdentity
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspFrame, frame_size, request
@@ -75,7 +75,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class Save:
-    """Store a received mission. Answer: its number, or None if that failed or timed out."""
+    """Store a received mission, see BeginSave."""
 
     mission: ArrivedMission
 
@@ -89,12 +89,12 @@ class BeginSave:
 
 @dataclass(frozen=True, slots=True)
 class EndSave:
-    """Wait for the mission of the last BeginSave. Answer: as Save's."""
+    """Wait for the mission of the last BeginSave. Answer: its number, or None if that failed or timed out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conclude:
-    """Store the outcome of mission `number`. Answer: True if stored."""
+    """Store the outcome of mission `number` with one sentence. Answer: True if stored."""
 
     number: int
     outcome: Outcome
@@ -103,14 +103,17 @@ class Conclude:
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Look up a list that was verified before. Answer: a RecalledMission. Returns None if there was none."""
+    """Look up a list that was verified before. Answer: a RecalledMission, or None if there was none."""
 
     identity: ListIdentity
 
 
 @dataclass(frozen=True, slots=True)
 class NoteReader:
-    """A ground station has read the list `identity` back. `reader`: its Sender.identity. Answer: None."""
+    """Store that a ground station has read the list back, and counts the items as read. `reader`: its Sender.identity.
+
+    No conversation waits for it.
+    """
 
     identity: ListIdentity
     reader: str
@@ -118,12 +121,12 @@ class NoteReader:
 
 @dataclass(frozen=True, slots=True)
 class FindPending:
-    """Look up missions that were never concluded. Answer: a sequence of PendingMission."""
+    """Look up missions whose end an earlier run of the daemon did not see. Answer: PendingMissions, None if none."""
 
 
 Effect = (
     TimeLimit | Send | Receive | Pause
-    | Save | BeginSave | EndSave | Conclude | Recall | NoteReader | FindPending
+    | BeginSave | EndSave | Conclude | Recall | FindPending
 )  # fmt: skip
 StoreEffect = Save | Conclude | Recall | NoteReader | FindPending
 
@@ -183,37 +186,3 @@ def ask_armed(arm_bit: int | None, *, tries: int = 3) -> Conversation[bool | Non
 
 def _stable_part(reply: MspFrame, size: int | None) -> MspFrame:
     return replace(reply, payload=reply.payload[:size])
-
-
-def begin_save(mission: ArrivedMission) -> Conversation[None]:
-    """Start to store a received mission. `end_save` waits for it."""
-    yield BeginSave(Save(mission))
-
-
-def end_save() -> Conversation[int | None]:
-    """The number of the mission of `begin_save`, or None if the store failed."""
-    number: int | None = yield EndSave()
-    return number
-
-
-def conclude(number: int, outcome: Outcome, detail: str) -> Conversation[bool]:
-    """Store the outcome of a mission with one sentence. Returns True if stored."""
-    done: bool | None = yield Conclude(number, outcome, detail)
-    return bool(done)
-
-
-def recall(identity: ListIdentity) -> Conversation[RecalledMission | None]:
-    """A list that was verified before, or None if there was none."""
-    mission: RecalledMission | None = yield Recall(identity)
-    return mission
-
-
-def note_reader(identity: ListIdentity, reader: str) -> Conversation[None]:
-    """Store that a ground station has read the list back: from now on it counts the items as read."""
-    yield NoteReader(identity, reader)
-
-
-def find_pending() -> Conversation[Sequence[PendingMission]]:
-    """Missions whose end an earlier run of the daemon did not see, or none if the store does not answer."""
-    pending: Sequence[PendingMission] | None = yield FindPending()
-    return pending or ()

@@ -14,7 +14,6 @@ from bridge.line.conversation import (
     EndSave,
     FindPending,
     LinkLost,
-    NoteReader,
     OutOfTime,
     Pause,
     Recall,
@@ -203,7 +202,7 @@ class Runner:
                             answer = self._begun.answers[0]
                             continue
                         deadline = now + _ACK_WAITS_S
-                    case Save() | Conclude() | Recall() | NoteReader() | FindPending():
+                    case Conclude() | Recall() | FindPending():
                         self._do(effect)
                         deadline = now + (_ACK_WAITS_S if isinstance(effect, Conclude) else _STORE_TIMEOUT_S)
                 self._awaited = effect

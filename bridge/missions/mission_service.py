@@ -12,15 +12,16 @@ from math import inf
 from typing import Any, TypeVar
 
 from bridge.line.conversation import (
+    BeginSave,
+    Conclude,
     Conversation,
+    EndSave,
     LinkLost,
+    NoteReader,
     Pause,
+    Recall,
+    Save,
     Stopped,
-    begin_save,
-    conclude,
-    end_save,
-    note_reader,
-    recall,
 )
 from bridge.line.runner import Runner
 from bridge.missions.fc_mission_store import (
@@ -127,7 +128,7 @@ class MissionService:
     #: The current flight controller stores such lists, or did until it was lost. Missions are always answered.
     are_stored: bool = True
 
-    def __init__(self, vehicle: Vehicle, runner: Runner, do: Callable[[MissionEnded], object]) -> None:
+    def __init__(self, vehicle: Vehicle, runner: Runner, do: Callable[[MissionEnded | NoteReader], object]) -> None:
         self.vehicle = vehicle
         self.runner = runner
         self._do = do
@@ -290,7 +291,7 @@ class MissionService:
         `is_kept` False: do not store it, because too many lists arrived.
         """
         if is_kept:
-            yield from begin_save(arrived)
+            yield BeginSave(Save(arrived))
         fc_store, verdict = self.fc_store, arrived.verdict
         identity, before = identify(verdict.records), None if self.held is None else self.held.identity
         outcome: Outcome | None = Outcome.FAILED
@@ -320,11 +321,11 @@ class MissionService:
             else:
                 ack, why = _ACKS.get(result.failure, MissionResult.DENIED), result.failure.value
                 outcome = None if result.failure is PushFailure.UNCERTAIN else outcome
-        number = (yield from end_save()) if is_kept else None
+        number: int | None = (yield EndSave()) if is_kept else None
         if outcome is None:
             # Only reading the list will show it.
             self.pending.append(PendingMission(number, identity, before))
-        if number is not None and outcome is not None and not (yield from conclude(number, outcome, why.text)):
+        if number is not None and outcome is not None and not (yield Conclude(number, outcome, why.text)):
             number = None
         delivery = DeliveryResult(ack, why, number, change)
         self._do(MissionEnded(arrived, delivery))
@@ -339,13 +340,12 @@ class MissionService:
         newest = dict([*sent_seqs.items()][-_MOST_SENDERS:])
         return HeldMission(identity, verdict.records, verdict.items, newest, verdict.path)
 
-    def note_reader(self, reader: str, now: float) -> None:
+    def note_reader(self, reader: str) -> None:
         """A ground station (its Sender.identity) has read the list: from now on it counts the items as read."""
         if self.held is not None and reader in self.held.sent_seqs:
             others = {sender: seqs for sender, seqs in self.held.sent_seqs.items() if sender != reader}
             self.held = replace(self.held, sent_seqs=others)
-            noted = note_reader(self.held.identity, reader)
-            self.runner.start(noted, lambda _result, _at: None, now, in_background=True)
+            self._do(NoteReader(self.held.identity, reader))
 
     def _push(
         self, fc_store: AnyFcMissionStore, arrived: ArrivedMission, progress: PushProgress
@@ -389,7 +389,7 @@ class MissionService:
         identity = identify(records)
         if self.held is not None and self.held.identity == identity:
             return self._refreshed(fc_store, self.held)
-        known = (yield from recall(identity)) or RecalledMission()
+        known: RecalledMission = (yield Recall(identity)) or RecalledMission()
         sent_seqs = {sender: seqs for sender, seqs in known.sent_seqs.items() if is_renumbered(seqs)}
         items = fc_store.items(records, known.sent_as)
         path = check_list(items, report.rules, self.vehicle.place()).path

@@ -120,7 +120,7 @@ class MissionDownloads:
         elif question.seq < len(items):
             self._send_item(question, items[question.seq])
             if question.seq == len(items) - 1:
-                self._missions.note_reader(sender.identity, now)
+                self._missions.note_reader(sender.identity)
         elif question.seq == 0 and self._has_home:
             self._send_item(question, self._home_item())
         else:

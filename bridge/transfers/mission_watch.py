@@ -4,7 +4,7 @@
 from math import inf
 
 from bridge.gcs.ground import Ground
-from bridge.line.conversation import Conversation, LinkLost, conclude, find_pending, recall
+from bridge.line.conversation import Conclude, Conversation, FindPending, LinkLost, Recall
 from bridge.missions.fc_mission_store import Loading
 from bridge.missions.mission_service import NO_LINK, HeldMission, MissionService
 from bridge.model.events import Emit, Level, MissionChangedOnBoard
@@ -46,7 +46,7 @@ class MissionWatch:
         """True if the list must be read, because it is unknown or was changed on the board."""
         if not self._has_asked_store:
             self._has_asked_store = True
-            self._missions.pending += yield from find_pending()
+            self._missions.pending += (yield FindPending()) or ()
         if isinstance(self._missions.fc_store, Refusal):
             return False
         is_known = self._missions.is_settled and not self._missions.pending
@@ -69,7 +69,7 @@ class MissionWatch:
         if isinstance(held, Refusal) or (is_first and not (is_loaded and held.records)):
             return None
         if is_loaded:
-            is_ours = (yield from recall(held.identity)) is not None
+            is_ours = (yield Recall(held.identity)) is not None
             return (sentences.LOADED_AGAIN if is_ours else sentences.LOADED_FOREIGN)(held.identity.count)
         if before is not None and before.identity == held.identity:
             return None
@@ -89,7 +89,7 @@ class MissionWatch:
             else:
                 outcome, why = Outcome.FAILED, sentences.ARRIVED_INCOMPLETE()
             if mission.number is not None:
-                yield from conclude(mission.number, outcome, why.text)
+                yield Conclude(mission.number, outcome, why.text)
             if mission.identity is not None:
                 news = why
         return news
