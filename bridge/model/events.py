@@ -200,12 +200,10 @@ class MissionChangedOnBoard(BridgeEvent):
 
 
 class SettingsRead(BridgeEvent):
-    """All settings were read, for the first time or with `changed` values. `left_out`: those with impossible names."""
+    """All settings were read for the first time."""
 
     name_in_log = "settings.read"
     settings: int
-    changed: str
-    left_out: int
 
 
 class SettingChanged(BridgeEvent):

@@ -93,13 +93,12 @@ class BoardSetting:
 class SettingTable:
     """All settings of a board, in its own order.
 
-    is_complete: False if some could not be read. Their names are missing. left_out: how many have a name that no ground
-    station or file could take. is_remembered: True if only the values are known, from the last time.
+    is_complete: False if some could not be read. Their names are missing. is_remembered: True if only the values are
+    known, from the last time.
     """
 
     settings: Mapping[str, BoardSetting] = field(default_factory=dict)
     is_complete: bool = True
-    left_out: int = 0
     is_remembered: bool = False
 
     def __iter__(self) -> Iterator[BoardSetting]:
@@ -116,15 +115,10 @@ class SettingTable:
     def updated(self, *settings: BoardSetting) -> "SettingTable":
         return replace(self, settings={**self.settings, **{setting.name: setting for setting in settings}})
 
-    def differences(self, later: "SettingTable") -> tuple[str, ...]:
-        """The names of settings with another value, or only in one of the tables."""
-        before, after = ({each.name: each.value for each in table} for table in (self, later))
-        return tuple(name for name in {**before, **after} if before.get(name) != after.get(name))
-
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
-    possible = {setting.name: setting for setting in settings if is_setting_name(setting.name)}
-    return SettingTable(possible, is_complete, len(settings) - len(possible))
+    """Without those whose names no ground station or file could take."""
+    return SettingTable({each.name: each for each in settings if is_setting_name(each.name)}, is_complete)
 
 
 def remembered_table(values: Mapping[str, Value]) -> SettingTable:

@@ -31,12 +31,10 @@ from protocols.rights.msp import msp_right
 _FIRST_S, _AFTER_CHANGE_S, _INTERVAL_S = 0.2, 5.0, 60.0
 #: While the line is needed for something else, and after a failure, doubled after each further one.
 _RETRY_S, _MOST_RETRY_S = 0.3, 60.0
-#: Names in the log of settings that have changed.
-_MOST_NAMED = 20
 #: A change is a handful of short requests.
 _CHANGE_SIZE = 200
-#: Items that wait: of one client, which repeats them, and of all.
-_MOST_OF_ONE, _MOST_WAITING = 8, 64
+#: Items that wait. A flood of changes would fill the memory.
+_MOST_WAITING = 64
 _UID_SIZE = 12
 #: A client waits this long for a table: INAV's takes 20 s, a Harakiri's over MAVLink 24 s, and again for a lost value.
 READ_WITHIN_S = 60.0
@@ -150,14 +148,12 @@ class BoardSettings:
 
         The same request of a client that still waits is not repeated, and does not get an answer of its own.
         """
+        asked = client, name, value
+        changes = (each for each in self._work if isinstance(each, SettingChange))
+        if any((each.client, each.name, each.value) == asked for each in changes):
+            return
         change = SettingChange(client, on_done, name=name, value=value)
-        of_client = 0
-        for each in self._work:
-            if each.client == client:
-                of_client += 1
-                if isinstance(each, SettingChange) and (each.name, each.value) == (name, value):
-                    return
-        if len(self._work) >= _MOST_WAITING or of_client >= _MOST_OF_ONE:
+        if len(self._work) >= _MOST_WAITING:
             change.end(_TOO_MANY, now)
             return
         self._work.append(change)
@@ -311,15 +307,13 @@ class BoardSettings:
             return
         self._retry_s, self._read_at = _RETRY_S, inf
         self._read_again(now + _INTERVAL_S)
-        is_first = self.known.table is None or self.known.table.is_remembered
-        reading = self.known.read(table, now)
-        if is_first or reading.changed:
-            names = ", ".join(reading.changed[:_MOST_NAMED])
-            self._emit(SettingsRead(settings=len(table), changed=names, left_out=table.left_out))
-        if reading.elsewhere is not None:
-            self._report(reading.elsewhere)
-        if reading.backup is not None:
-            self._emit(reading.backup)
+        if self.known.table is None or self.known.table.is_remembered:
+            self._emit(SettingsRead(settings=len(table)))
+        elsewhere, backup = self.known.read(table, now)
+        if elsewhere is not None:
+            self._report(elsewhere)
+        if backup is not None:
+            self._emit(backup)
         self._answer_readers(table, now)
 
     def _report(self, change: SettingsChange) -> None:

@@ -5,7 +5,6 @@ The settings of each board are remembered, so that a change without the bridge b
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from zlib import crc32
 
@@ -33,18 +32,6 @@ class Freshness(IntEnum):
     #: A change through the bridge was read back. It may have had an effect on other settings.
     CHANGED = 2
     CHECKED = 3
-
-
-@dataclass(frozen=True, slots=True)
-class ReadResult:
-    """The result of reading all settings. changed: names of settings that differ from the table before.
-
-    elsewhere: the change without the bridge. backup: the table, if it is worth a backup.
-    """
-
-    changed: tuple[str, ...]
-    elsewhere: SettingsChange | None
-    backup: TakenBackup | None
 
 
 class KnownSettings:
@@ -100,13 +87,11 @@ class KnownSettings:
         self.may_have_changed()
         self.is_saved = True
 
-    def read(self, table: SettingTable, now: float) -> ReadResult:
-        """All settings were read."""
-        former, self.table = self.table, table
-        changed = () if former is None else former.differences(table)
-        self.freshness, self._is_ours = Freshness.CHECKED, False
+    def read(self, table: SettingTable, now: float) -> tuple[SettingsChange | None, TakenBackup | None]:
+        """All settings were read. The change without the bridge, and the table if it is worth a backup."""
+        self.table, self.freshness, self._is_ours = table, Freshness.CHECKED, False
         if self.board is None or not table:
-            return ReadResult(changed, None, None)
+            return None, None
         values = {setting.name: setting.value for setting in table}
         remembered = self._memory.recall(self.board)
         names = tuple(
@@ -121,7 +106,7 @@ class KnownSettings:
         last = self.state.change if self.state is not None and is_same_board else None
         seal = f"{crc32(repr(sorted(values.items())).encode()):08x}"
         self.state = SettingsState(self.board, seal, elsewhere or last)
-        return ReadResult(changed, elsewhere, self._backup(self.board, values) if table.is_complete else None)
+        return elsewhere, self._backup(self.board, values) if table.is_complete else None
 
     def _backup(self, board: BoardId, values: Mapping[str, Value]) -> TakenBackup | None:
         """With changes that are not saved yet it is not a backup: a restart would lose them."""

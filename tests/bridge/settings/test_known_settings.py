@@ -153,7 +153,6 @@ def test_a_change_of_any_other_setting_of_a_patched_harakiri_is_reported_and_all
     assert event.facts["detail"] == "Settings changed elsewhere: nav_speed_max"
     assert warnings(station) == [event.facts["detail"]]
     assert client.value("nav_speed_max") == 777
-    assert world.events("settings.read")[-1].facts["changed"] == "nav_speed_max"
 
 
 def test_while_the_checksum_holds_a_list_comes_from_memory() -> None:

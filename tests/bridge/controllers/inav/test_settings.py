@@ -31,16 +31,14 @@ def test_a_mission_is_not_kept_waiting_by_a_reading() -> None:
     assert asked(world) < 1.3 * len(INAV_SETTINGS)
 
 
-def test_a_setting_with_an_impossible_name_is_left_out_and_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_setting_with_an_impossible_name_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its name would reach every ground station, and make a backup unreadable."""
     names = {"nav_max_altitude": "a\x1b[2J", "nav_rth_altitude": "b\nc,9", "nav_wp_radius": "[/x]"}
     settings = tuple(setting._replace(name=names.get(setting.name, setting.name)) for setting in INAV_SETTINGS)
     monkeypatch.setattr("simulator.inav.settings.SETTINGS", settings)
     world = World(speeds=(115200,), peer=make_board("inav"))
     table = SettingsClient(world).wait_read(60)
-    assert (table.left_out, table.is_complete, "[/x]" in table.settings) == (2, True, True)
-    world.run(60)
-    assert [event.facts["left_out"] for event in world.events("settings.read")] == [2]
+    assert (table.is_complete, {*names.values()} & table.settings.keys()) == (True, {"[/x]"})
     text = write_param_file({setting.name: setting.value for setting in table})
     assert read_param_file(text.encode(), "backup").values.keys() == table.settings.keys()
 
