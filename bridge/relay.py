@@ -32,7 +32,7 @@ from bridge.voice import sentences
 from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message, repack
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
-from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from reports.finding import Finding, RejectingFinding, without_defaults
 from reports.verdict import Result, Verdict
@@ -142,13 +142,8 @@ class Relay:
             return
         if frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
             self.ground.outbox.heartbeat = self.ids, packed
+            self.missions.vehicle.hear(FlightState(now, Source.MAVLINK, not is_disarmed_heartbeat(frame)))
         self.ground.outbox.multicast(packed, self.ground.everyone)
-        message = decode(frame) if frame.msgid in _HEARD else None
-        if message is not None and frame.msgid == m.MAVLINK_MSG_ID_HEARTBEAT:
-            armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
-            self.missions.vehicle.hear(FlightState(now, Source.MAVLINK, armed))
-        elif message is not None:
-            self.missions.vehicle.hear_home(message.latitude, message.longitude, message.altitude / 1000)
 
     def holds(self, items: tuple[MissionItem, ...] | None, identity: ListIdentity | None) -> None:
         is_known = items is not None and identity is not None
@@ -189,7 +184,6 @@ class Relay:
         return True
 
 
-_HEARD = (m.MAVLINK_MSG_ID_HEARTBEAT, m.MAVLINK_MSG_ID_HOME_POSITION)
 _READS = (
     m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
     m.MAVLINK_MSG_ID_MISSION_REQUEST,

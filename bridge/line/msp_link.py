@@ -100,10 +100,6 @@ class PendingReplies:
         """The bytes that may still arrive."""
         return sum(size for _, size in self._present(speed, now))
 
-    def questions(self, speed: int | None, now: float) -> int:
-        """The number of requests that may still be answered."""
-        return len(self._present(speed, now))
-
     def heard(self, speed: int | None, size: int, now: float) -> None:
         """The board has resumed with a reply of `size` bytes (0: with other data), so the rest is on its way."""
         rest: list[tuple[float, int]] = []
@@ -127,28 +123,23 @@ class LastReplies:
 
     def __init__(self) -> None:
         self._replies: dict[bytes, tuple[MspFrame, float]] = {}  # the command heard least recently first
-        #: Constant replies that were heard twice: MSP's 8-bit checksum misses some damage.
-        self._confirmed: dict[bytes, MspFrame] = {}
 
     def heard(self, asked: bytes, reply: MspFrame, now: float) -> None:
-        before = self._replies.pop(asked, None)
+        before, heard_at = self._replies.pop(asked, None), now
         if asked in _CONSTANT and before is not None and before[0] == reply:
-            self._confirmed[asked] = reply
+            heard_at = inf  # heard twice: MSP's 8-bit checksum misses some damage
         elif len(self._replies) >= _MOST_REPLIES:
             del self._replies[next(iter(self._replies))]
-        self._replies[asked] = reply, now
+        self._replies[asked] = reply, heard_at
 
     def get(self, asked: bytes, max_age_s: float, now: float) -> MspFrame | None:
         """The reply to a request if it is at most this old, or constant."""
-        if (constant := self._confirmed.get(asked)) is not None:
-            return constant
         reply, heard_at = self._replies.get(asked, (None, now))
         return reply if now <= heard_at + max_age_s else None
 
     def forget(self) -> None:
         """Forget all replies, because the board was changed."""
         self._replies.clear()
-        self._confirmed.clear()
 
 
 class _Reply(Enum):

@@ -94,7 +94,7 @@ SETTINGS: Mapping[Firmware, tuple[SettingsRequest, ...]] = {
     Firmware.BETAFLIGHT: _NEW,
     Firmware.INAV: (RANGES,),
     # Its MISC may have counters, and the rates any layout.
-    Firmware.UNKNOWN: (_PIDS, RANGES, SettingsRequest(Part.RATES, Msp.RC_TUNING, 204)),
+    Firmware.UNKNOWN: (_PIDS, SettingsRequest(Part.RATES, Msp.RC_TUNING, 204)),
 }
 _PID_SIZE = 3
 

@@ -282,21 +282,7 @@ _INAV: Rights = {
 }  # fmt: skip
 
 
-def _agreed(command: int, tables: Collection[Rights]) -> MspRight | None:
-    """The right of a request that is a read on every firmware with a handler for it. The others answer with an error.
-
-    A number that few of them use may be anything on a board that is none of them.
-    """
-    rights = [table[command] for table in tables if command in table]
-    if len(rights) < _FEW or any(right.effect is not Effect.READ for right in rights):
-        return None
-    lengths = frozenset.intersection(*[frozenset(right.lengths) for right in rights])
-    limits = [right.only for right in rights if right.only]
-    only = frozenset.intersection(*limits) if limits else frozenset[bytes]()
-    return MspRight(rights[0].name, Effect.READ, lengths, max(right.reply for right in rights), only)
-
-
-_KNOWN: Mapping[Firmware, Rights] = {
+MSP_RIGHTS: Mapping[Firmware, Rights] = {
     Firmware.HARAKIRI: _HARAKIRI,
     Firmware.HARAKIRI_MISSIONS: _HARAKIRI_MISSIONS,
     Firmware.BASEFLIGHT: _BASEFLIGHT,
@@ -304,13 +290,6 @@ _KNOWN: Mapping[Firmware, Rights] = {
     Firmware.CLEANFLIGHT: _CLEANFLIGHT,
     Firmware.BETAFLIGHT: _BETAFLIGHT,
     Firmware.INAV: _INAV,
-}
-_FEW = 3
-MSP_RIGHTS: Mapping[Firmware, Rights] = {
-    **_KNOWN,
-    Firmware.UNKNOWN: {
-        command: right
-        for command in range(255)
-        if (right := _agreed(command, _KNOWN.values())) is not None and right.lengths
-    },
+    # Reads on every firmware above.
+    Firmware.UNKNOWN: {**_OLD_READS, 118: MspRight("WP", Effect.READ, (1,), 21, frozenset((b"\x00",)))},
 }

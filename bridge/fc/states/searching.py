@@ -30,8 +30,6 @@ _HEARTBEAT_SPEEDS = (115200, 57600)
 _FULL_VISIT_S = 1.1
 _LISTEN_S = 0.1
 _PROBE_INTERVAL_S = 0.15
-#: This many probes go out at the interval above, later probes more slowly: a stalled board may answer all at once.
-_QUICK_PROBES = 4
 _CONFIRM_S = 0.3
 _ANSWER_SIZE = 13
 #: Of autopilots, and of a Harakiri. A radio sends as another, and so does the ground station at its other end.
@@ -124,16 +122,14 @@ class Searching(State):
     def _probe(self, now: float) -> float:
         """Send a probe if there is room for the reply. Return the time to wait for it."""
         room = self.pending.room(self.speed, now)
-        waiting = self.pending.questions(self.speed, now)
-        interval_s = _PROBE_INTERVAL_S * max(waiting / _QUICK_PROBES, 1)
         # Every second probe also fills a parser that is stuck in the middle of a frame. A command line is not filled.
         is_typed = self._visit.echo.is_echo(_ECHO_SIZE)
         if self._visit.probes % 2 and not is_typed and room >= RESYNC_REPLY_SIZE:
-            return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + interval_s
+            return self._ask(RESYNC, RESYNC_REPLY_SIZE, now) + _PROBE_INTERVAL_S
         if room >= _ANSWER_SIZE:
             self._visit.echo.sent.append(PROBE)
-            return self._ask(PROBE, _ANSWER_SIZE, now) + interval_s
-        return interval_s
+            return self._ask(PROBE, _ANSWER_SIZE, now) + _PROBE_INTERVAL_S
+        return _PROBE_INTERVAL_S
 
     def _ask(self, frame: bytes, reply_size: int, now: float) -> float:
         """Send a probe. Return the time that it and the reply take on the wire."""

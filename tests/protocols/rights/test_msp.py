@@ -53,7 +53,7 @@ RECORDS = [WpRecord(453838000, 84733000, 20, 0, 0, 2, 0, 0)] * MAX_CHUNK_RECORDS
 
 #: Every frame that the bridge can send, with the firmware it sends it to.
 #: Their chip's number can be read.
-NUMBERED = (Firmware.BASEFLIGHT, Firmware.CLEANFLIGHT, Firmware.BETAFLIGHT, Firmware.INAV, Firmware.UNKNOWN)
+NUMBERED = (Firmware.BASEFLIGHT, Firmware.CLEANFLIGHT, Firmware.BETAFLIGHT, Firmware.INAV)
 READS: list[tuple[Iterable[Firmware], bytes]] = [
     (EVERY, PROBE),
     (EVERY, RESYNC),
