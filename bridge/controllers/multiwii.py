@@ -198,8 +198,6 @@ PROFILE = Profile(
     polls=(*POLLS, NAV_POLL),
     accepts_any_byte=True,
     currents_per_a=CURRENTS_PER_A,
-    # Its own axes are left, back and up (IMU.cpp).
-    acc_axes=((1, -1), (0, -1), (2, -1)),
     missions=lambda board, vehicle, _: MultiwiiMissions(multiwii_profile(board.capacity), board, vehicle),
     settings=MspPartSettings,
     check_kind="multiwii",

@@ -19,9 +19,7 @@ from protocols.msp.telemetry import (
     decode_box_activation,
     decode_channels,
     decode_home,
-    decode_motors,
     decode_raw_gps,
-    decode_raw_imu,
     decode_status,
 )
 
@@ -38,17 +36,11 @@ POLL_FOR: Mapping[type[v.Reading], Msp] = {
     v.Charge: Msp.ANALOG,
     v.Signal: Msp.ANALOG,
     v.Sticks: Msp.RC,
-    v.Motors: Msp.MOTOR,
-    v.ImuSample: Msp.RAW_IMU,
     v.MissionLeg: Msp.NAV_STATUS,
     v.Readiness: Msp.INAV_STATUS,
 }
 _MAX_RSSI = 1020
 _STATUS_FLAGS = 32
-#: RAW_IMU's acceleration on Harakiri, INAV and MultiWii.
-_ONE_G = 512
-#: A craft may turn the other way by then.
-_RATES_STALE_S = 0.3
 
 
 def hear_msp(vehicle: v.Vehicle, frame: MspFrame, controller: FlightController, now: float) -> None:
@@ -58,7 +50,7 @@ def hear_msp(vehicle: v.Vehicle, frame: MspFrame, controller: FlightController, 
         decode(vehicle, frame.payload, controller, now)
 
 
-def _attitude(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
+def _attitude(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     """MSP's pitch is nose-down positive on all firmware."""
     reply = decode_attitude(payload)
     if reply is not None:
@@ -66,16 +58,7 @@ def _attitude(vehicle: v.Vehicle, payload: bytes, controller: FlightController, 
         has_compass = health is not None and Sensor.COMPASS in health.sensors
         roll_ddeg, pitch_ddeg, heading_deg = reply
         angles_deg = roll_ddeg / 10, -pitch_ddeg / 10, float(heading_deg % 360)
-        rates = _rates_deg_s(vehicle, now) if controller.profile.has_gyro_deg_s else None
-        vehicle.hear(v.Orientation(now, v.Source.MSP, *angles_deg, has_compass, rates))
-
-
-def _rates_deg_s(vehicle: v.Vehicle, now: float) -> tuple[float, float, float] | None:
-    imu = vehicle.fresh(v.ImuSample, now, _RATES_STALE_S)
-    if imu is None:
-        return None
-    forward, left, up = imu.gyro
-    return float(forward), -float(left), -float(up)
+        vehicle.hear(v.Orientation(now, v.Source.MSP, *angles_deg, has_compass))
 
 
 def _raw_gps(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
@@ -161,19 +144,6 @@ def _rc(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: 
         vehicle.hear(v.Sticks(now, v.Source.MSP, (roll, pitch, throttle, yaw, *aux)))
 
 
-def _motor(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
-    outputs = decode_motors(payload)
-    if outputs is not None:
-        vehicle.hear(v.Motors(now, v.Source.MSP, outputs))
-
-
-def _raw_imu(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
-    imu = decode_raw_imu(payload)
-    if imu is not None:
-        forward, right, down = (round(sign * imu.acc[at] * 1000 / _ONE_G) for at, sign in controller.profile.acc_axes)
-        vehicle.hear(v.ImuSample(now, v.Source.MSP, (forward, right, down), imu.gyro, imu.mag))
-
-
 def _box(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
     activation = decode_box_activation(payload, len(controller.boxes))
     if activation is not None:
@@ -199,8 +169,6 @@ _DECODERS: Mapping[int, Decoder] = {
     Msp.STATUS: _status,
     Msp.ANALOG: _analog,
     Msp.RC: _rc,
-    Msp.MOTOR: _motor,
-    Msp.RAW_IMU: _raw_imu,
     Msp.BOX: _box,
     Msp.WP: _wp,
     Msp.NAV_STATUS: _nav_status,

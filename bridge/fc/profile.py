@@ -134,8 +134,6 @@ class Profile:
     polls: the telemetry questions it answers. decoders: by command, for replies in its own layout. The common decoders
     are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
     currents_per_a: the unit of ANALOG's current is 1 A divided by this.
-    acc_axes: index and sign of the forward, right and downward acceleration in its RAW_IMU.
-    has_gyro_deg_s: its RAW_IMU has the gyro in degrees a second, about the axes forward, left, up.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
@@ -157,8 +155,6 @@ class Profile:
     decoders: Mapping[int, Decoder] = field(default_factory=dict)
     has_2d_fix: bool = False
     currents_per_a: int = 100
-    acc_axes: tuple[tuple[int, int], ...] = ((0, 1), (1, -1), (2, -1))
-    has_gyro_deg_s: bool = False
     accepts_any_byte: bool = False
     turn_s: float = 0.0
     silence_s: float = MSP_SILENCE_S

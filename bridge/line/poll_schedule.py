@@ -73,9 +73,9 @@ POLLS = (
     Poll(Msp.ANALOG, request(Msp.ANALOG), 9, 1.0),
     Poll(Msp.RC, request(Msp.RC), 68, 1.0),
     Poll(Msp.WP, request(Msp.WP, b"\0"), 21, 2.0),
+    # For other programs only.
     Poll(Msp.MOTOR, request(Msp.MOTOR), 16, inf),
     Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, inf),
-    # For other programs only.
     Poll(Msp.SERVO, request(Msp.SERVO), 16, inf),
     Poll(Msp.COMP_GPS, request(Msp.COMP_GPS), 5, inf),
     Poll(Msp.DEBUG, request(Msp.DEBUG), 16, inf),

@@ -188,22 +188,6 @@ class Airspeed(Reading):
 
 
 @dataclass(slots=True)
-class Motors(Reading):
-    """Motor outputs, microseconds."""
-
-    outputs_us: tuple[int, ...]
-
-
-@dataclass(slots=True)
-class ImuSample(Reading):
-    """acc_mg: forward, right, down, 1/1000 g; at rest 0, 0, -1000. Gyro and compass: in the firmware's own units."""
-
-    acc_mg: tuple[int, int, int]
-    gyro: tuple[int, int, int]
-    mag: tuple[int, int, int]
-
-
-@dataclass(slots=True)
 class MissionLeg(Reading):
     """Progress through the mission, from flight controllers that report it."""
 

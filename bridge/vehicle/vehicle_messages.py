@@ -70,7 +70,7 @@ _UNKNOWN_VERSION = (1, 0, 0)
 _OFFICIAL = 255
 _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_U8 = 0xFF
-_RAW_CHANNELS, _CHANNELS = 8, 18
+_CHANNELS = 18
 #: Cells in BATTERY_STATUS.
 _MOST_CELLS = 10
 _MAX_RSSI = 254
@@ -241,8 +241,7 @@ def attitude(at: Moment) -> Message:
     now = at.need(v.Orientation)
     heading_deg = (now.heading_deg + 180) % 360 - 180
     angles = map(math.radians, (now.roll_deg, now.pitch_deg, heading_deg))
-    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
-    return pack_attitude(at.boot_ms, *angles, *rates)
+    return pack_attitude(at.boot_ms, *angles, *_UNKNOWN_RATES)
 
 
 def gps_raw_int(at: Moment) -> Message:
@@ -405,32 +404,18 @@ def rc_channels(at: Moment) -> Message:
     return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields, _rssi(at))
 
 
-def raw_imu(at: Moment) -> Message:
-    """RAW_IMU: 1/1000 g. Gyro and compass in the flight controller's own scale."""
-    imu = at.need(v.ImuSample)
-    x, y, z = (_fit(axis, 16) for axis in imu.acc_mg)
-    return messages.MAVLink_raw_imu_message(at.boot_ms * 1000, x, y, z, *imu.gyro, *imu.mag)
-
-
-def servo_output_raw(at: Moment) -> Message:
-    """SERVO_OUTPUT_RAW: the motors, microseconds."""
-    outputs = (*at.need(v.Motors).outputs_us, *[0] * _RAW_CHANNELS)[:_RAW_CHANNELS]
-    return messages.MAVLink_servo_output_raw_message(at.boot_ms * 1000 & 0xFFFFFFFF, 0, *outputs)
-
-
 def attitude_quaternion(at: Moment) -> Message:
     """ATTITUDE_QUATERNION: w, x, y, z."""
     now = at.need(v.Orientation)
     halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
     (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
-    rates = _UNKNOWN_RATES if now.rates_deg_s is None else map(math.radians, now.rates_deg_s)
     return messages.MAVLink_attitude_quaternion_message(
         at.boot_ms,
         cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
         sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
         cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
         cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
-        *rates,
+        *_UNKNOWN_RATES,
     )
 
 

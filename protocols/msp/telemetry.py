@@ -13,7 +13,6 @@ from protocols.plain_text import PlainText, plain_text
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
 STATUS_SIZE = _STATUS.size
-_MOTORS = struct.Struct("<8H")
 _RAW_IMU = struct.Struct("<9h")
 RAW_IMU_SIZE = _RAW_IMU.size
 _RAW_GPS = struct.Struct("<BBiihH")
@@ -121,11 +120,6 @@ def decode_channels(payload: bytes) -> tuple[int, ...] | None:
     if count < _MIN_CHANNELS:
         return None
     return struct.unpack_from(f"<{min(count, _MAX_CHANNELS)}H", payload)
-
-
-def decode_motors(payload: bytes) -> tuple[int, ...] | None:
-    """Read MSP_MOTOR: eight outputs in microseconds, 0 for a missing motor."""
-    return _MOTORS.unpack_from(payload) if len(payload) >= _MOTORS.size else None
 
 
 def decode_raw_gps(payload: bytes) -> RawGps | None:

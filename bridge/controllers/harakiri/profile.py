@@ -31,8 +31,6 @@ _CAPABILITY = 0x80000000
 _OWN_BOX = "GTUNE"
 
 
-#: Its own axes are left, forward and up (imu.c).
-_ACC_AXES = ((1, 1), (0, -1), (2, -1))
 _THROTTLE = 2
 #: The highest value of rc_minchk, below which the throttle must be. The default is 1100.
 _SURELY_NOT_LOW_US = 1250
@@ -84,7 +82,6 @@ PATCHED = Profile(
     settings=HarakiriFcSettings,
     polls=(*POLLS, BOX_POLL, FLIGHT_POLL),
     decoders=FLIGHT_DECODERS,
-    acc_axes=_ACC_AXES,
     check_kind="harakiri",
     rules=lambda settings: HarakiriRules(takeoff_max_m=settings.takeoff_max_m),
     restarts_after_calibration=True,
@@ -95,7 +92,6 @@ UNPATCHED = Profile(
     _FAMILY,
     recognise=_recognise_unpatched,
     polls=(*POLLS, BOX_POLL),
-    acc_axes=_ACC_AXES,
     missions=Refusal(MissionResult.UNSUPPORTED, sentences.NOT_PATCHED()),
     settings=MspPartSettings,
     restarts_after_calibration=True,

@@ -63,7 +63,6 @@ PROFILE = Profile(
     decoders=INAV_DECODERS,
     arming_blockers=arming_blockers,
     has_2d_fix=True,
-    has_gyro_deg_s=True,
     accepts_any_byte=True,
     calibrates_six_positions=True,
     # The serial task runs 100 times a second (fc_tasks.c).

@@ -27,8 +27,6 @@ INAV_POLLS = (
     Poll(Msp.INAV_STATUS, request(Msp.INAV_STATUS), STATUS_SIZE, 1.0),
     Poll(Msp.INAV_ANALOG, request(Msp.INAV_ANALOG), ANALOG_SIZE, 1.0),
     Poll(Msp.INAV_AIR_SPEED, request(Msp.INAV_AIR_SPEED), AIRSPEED_SIZE, 0.5),
-    # For ATTITUDE's rates.
-    Poll(Msp.RAW_IMU, request(Msp.RAW_IMU), 18, 0.1),
     Poll(Msp.RTC, request(Msp.RTC), RTC_SIZE, 2.0),
     # For other programs only.
     Poll(Msp.SENSOR_STATUS, request(Msp.SENSOR_STATUS), 9, inf),

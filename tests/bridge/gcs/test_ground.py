@@ -241,7 +241,7 @@ def test_thirty_stations_that_request_everything_share_1200_messages_a_second() 
     stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
     for station in stations:
         station.send(gcs_heartbeat())
-        for msgid in (m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_RAW_IMU, m.MAVLINK_MSG_ID_VFR_HUD):
+        for msgid in (m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_RC_CHANNELS, m.MAVLINK_MSG_ID_VFR_HUD):
             station.send(m.MAVLink_command_long_message(1, 1, 511, 0, msgid, 10_000, 0, 0, 0, 0, 0))
     world.run(3)
     for station in stations:

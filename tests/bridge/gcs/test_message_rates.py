@@ -14,7 +14,7 @@ from tests.support.world import GroundStation, World, ready_world
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
-ATTITUDE, GPS_RAW_INT, RAW_IMU = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT, m.MAVLINK_MSG_ID_RAW_IMU
+ATTITUDE, GPS_RAW_INT = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT
 #: Sent without a request for messages.
 _UNASKED = {"HEARTBEAT", "HOME_POSITION"}
 #: Mission Planner's requests (stream, rate), sent twice at the first heartbeat.
@@ -80,13 +80,12 @@ def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:
     of_planner = {name: names.count(name) / 20 for name in names}
     expected = {
         "ATTITUDE": 4, "VFR_HUD": 4, "GPS_RAW_INT": 2, "GLOBAL_POSITION_INT": 2, "SYS_STATUS": 2, "RC_CHANNELS": 2,
-        "BATTERY_STATUS": 2, "RAW_IMU": 2, "EXTENDED_SYS_STATE": 2,
+        "BATTERY_STATUS": 2, "EXTENDED_SYS_STATE": 2,
     }  # fmt: skip
     assert {name: of_planner[name] for name in expected} == pytest.approx(expected, rel=0.1)
     assert of_planner["MISSION_CURRENT"] == pytest.approx(1, rel=0.1)
     assert of_other["ATTITUDE"] == pytest.approx(10, rel=0.05)
     assert of_other["GPS_RAW_INT"] == pytest.approx(5, rel=0.05)
-    assert "RAW_IMU" not in of_other
     # A faster station can make a message up to a quarter of its interval early.
     assert of_planner["ATTITUDE"] <= 4.1
 
@@ -96,7 +95,7 @@ def test_all_streams_may_be_requested_at_once_as_by_mavproxy(world: World) -> No
     station.send(stream(0, 4))
     world.run(1)
     rates = rates_hz(station)
-    for name in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS", "RC_CHANNELS", "RAW_IMU"):
+    for name in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS", "RC_CHANNELS"):
         assert rates[name] == pytest.approx(4, rel=0.1)
     station.send(stream(0, 0))
     world.run(0.1)
@@ -157,11 +156,6 @@ def test_each_message_can_be_requested_once(world: World, row: Row) -> None:
     world.faults.armed = True
     station = station_of(world, "gcs")
     world.run(4)
-    if msgid == RAW_IMU:
-        # No station requested it, so it is not polled.
-        assert ask(station, 512, msgid) == TEMPORARILY_REJECTED
-        ask(station, 511, msgid, 100_000)
-        world.run(0.5)
     name = m.mavlink_map[msgid].msgname
     ask(station, 511, msgid, -1)
     assert ask(station, 512, msgid) == ACCEPTED

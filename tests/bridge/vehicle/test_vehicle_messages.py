@@ -321,40 +321,6 @@ def test_the_mixer_determines_the_type(mixer: int, mav_type: int) -> None:
     assert make.heartbeat(at(vehicle)).type == mav_type
 
 
-def test_body_rates_come_from_inavs_gyro() -> None:
-    """INAV's axes are forward, left and up; MAVLink's are forward, right and down."""
-    turning = struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0)
-    for who, rates in ((INAV, (90, -45, 30)), (HARAKIRI, (math.nan, math.nan, math.nan))):
-        state = with_replies(Vehicle(), who, RAW_IMU=turning, ATTITUDE=attitude())
-        message = sent(make.attitude(at(state)))
-        told_rates = tuple(math.degrees(getattr(message, f"{axis}speed")) for axis in ("roll", "pitch", "yaw"))
-        assert told_rates == pytest.approx(rates, nan_ok=True)
-
-
-@pytest.mark.parametrize(
-    ("who", "acc", "shown"),
-    [
-        (INAV, (0, 0, 512), (0, 0, -1000)),
-        (INAV, (128, 256, 384), (250, -500, -750)),  # forward, left, up
-        (HARAKIRI, (256, 128, 384), (250, -500, -750)),  # left, forward, up
-        (BETAFLIGHT, (0, 0, 32767), (0, 0, -32768)),
-    ],
-)
-def test_acceleration_at_rest_is_upward_in_mavlinks_axes(
-    who: FlightController, acc: tuple[int, ...], shown: tuple[int, ...]
-) -> None:
-    state = with_replies(Vehicle(), who, RAW_IMU=struct.pack("<9h", *acc, 1, 2, 3, 4, 5, 6))
-    imu = make.raw_imu(at(state))
-    assert (imu.xacc, imu.yacc, imu.zacc) == shown
-    assert (imu.xgyro, imu.ymag) == (1, 5)
-
-
-def test_rates_are_unknown_once_the_gyro_is_silent() -> None:
-    state = with_replies(Vehicle(), INAV, RAW_IMU=struct.pack("<9h", 0, 0, 512, 90, 45, -30, 0, 0, 0))
-    hear_msp(state, MspFrame(Direction.REPLY, Msp.ATTITUDE, attitude()), INAV, 1.0)
-    assert math.isnan(sent(make.attitude(make.Moment(state, 1.0, 0))).rollspeed)
-
-
 def test_home_in_flight_is_lower_than_the_craft() -> None:
     state = with_replies(
         Vehicle(),
@@ -456,12 +422,8 @@ def test_height_and_speed_determine_the_landed_state(
     assert make.extended_sys_state(at(state)).landed_state == landed
 
 
-def test_motors_and_local_position_are_reported() -> None:
-    state = with_replies(
-        Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0), MOTOR=struct.pack("<8H", *range(1000, 1008))
-    )
-    motors = make.servo_output_raw(at(state))
-    assert [getattr(motors, f"servo{n}_raw") for n in range(1, 9)] == [*range(1000, 1008)]
+def test_local_position_is_reported() -> None:
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0))
     with_replies(state, HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=struct.pack("<ih", 1500, 20))
     with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 1797, more=struct.pack("<H", 0)))
     local = make.local_position_ned(at(state))
