@@ -13,7 +13,6 @@ An autopilot that speaks MAVLink itself is not represented but passed through, b
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import count
 from math import inf
 from typing import Any, Protocol
 
@@ -37,8 +36,7 @@ from bridge.model.vehicle import FlightState, GlobalPosition, Health, Readiness
 from bridge.settings.board_settings import BoardSettings
 from bridge.settings.local_settings import LocalSettings
 from bridge.settings.parameters import OwnParameters, Parameters
-from bridge.sharing.msp_sharing import MspSharing
-from bridge.sharing.program import Program
+from bridge.sharing.msp_sharing import MspSharing, Program
 from bridge.transfers.local_missions import LocalMissions
 from bridge.transfers.mission_types import MissionTypes
 from bridge.transfers.mission_watch import MissionWatch
@@ -58,17 +56,13 @@ from reports.vehicle_groups import Group, VehicleReport
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Counted since the start. Those of the flight controller since it was found, None without MSP."""
+    """Counted since the start."""
 
-    ground_stations: int
     #: Frames of ground stations: damaged and refused, by link and reason.
     bad_frames: int
     refused: Mapping[tuple[str, str], int]
     #: Requests of programs on a share, by reason.
     refused_by_share: Mapping[str, int]
-    fc_bad_checksums: int
-    fc_requests_lost: int | None
-    fc_round_trip_s: float | None
     firmware_version: tuple[int, int, int] | None
     settings: SettingsState | None
 
@@ -113,7 +107,7 @@ class Bridge:
         #: True while an autopilot speaks MAVLink itself: the bridge then does not send anything in its name.
         self.is_passing_through = False
 
-        owner, emit, incidents = config.settings, self._effects.append, count(1)
+        owner, emit = config.settings, self._effects.append
         ids = owner.sysid, config.compid
         # Ground stations, and the line to the flight controller.
         ground = self._ground = Ground(
@@ -122,7 +116,7 @@ class Bridge:
         routes = self._routes = Routes(ground)
         runner = self._runner = Runner(emit)
         port = Port(config.speeds, config.profiles, runner, routes.from_autopilot)
-        session = self._session = FcSession(port, emit, incidents, self._controller_changed, config.flight)
+        session = self._session = FcSession(port, emit, self._controller_changed, config.flight)
         #: The flight controller's readings, which are kept when it is lost.
         self.vehicle = port.vehicle
         # Missions, fences and rally points.
@@ -130,10 +124,10 @@ class Bridge:
         readiness = self._readiness = CraftReadiness(
             session, missions, ground, now, was_found=config.flight is not None, is_wired=None not in config.speeds
         )
-        types = self._types = MissionTypes(missions, ground, emit, incidents)
+        types = self._types = MissionTypes(missions, ground, emit)
         self._watch = MissionWatch(missions, ground, emit)
         #: Missions, for the command line, the page and zenoh.
-        self.missions = LocalMissions(missions, types.of_missions, ground, emit, incidents)
+        self.missions = LocalMissions(missions, types.of_missions, ground, emit)
         # The board's settings, and other programs' requests.
         settings = self._board_settings = BoardSettings(session, missions, ground, emit, config.settings_memory)
         sharing = self._sharing = MspSharing(session, missions, ground, emit, settings)
@@ -293,15 +287,10 @@ class Bridge:
         return self._reporter.group(group, now)
 
     def counters(self) -> Counters:
-        state = self._session.state
         return Counters(
-            ground_stations=len(self._ground.peers()),
             bad_frames=self._ground.bad_frames,
             refused=self._incoming.refused,
             refused_by_share=self._sharing.refused,
-            fc_bad_checksums=state.bad_checksums or 0,
-            fc_requests_lost=None if state.link is None else state.link.requests_lost,
-            fc_round_trip_s=None if state.link is None else state.link.round_trip_s,
             firmware_version=self.vehicle.version,
             settings=self._board_settings.known.state,
         )

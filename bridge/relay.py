@@ -10,7 +10,6 @@ link. Sans-IO.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from math import inf
 from typing import Any
 
@@ -112,7 +111,7 @@ class Relay:
         self.ground = Ground(*ids, _ignore, lambda _station, _now: None, {}, LinkAccess(), is_near)
         self._runner = Runner(lambda _effect: None)
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, self.effects)
-        self.uploads = MissionUploads(self.missions, self.ground, _ignore, count(1))
+        self.uploads = MissionUploads(self.missions, self.ground, _ignore)
         downloads = self._downloads = MissionDownloads(self.missions, self.ground)
         uploads = self.uploads
         self._handlers: Mapping[int, Callable[[Sender, Message, float], object]] = {

@@ -4,7 +4,7 @@
 `TRANSITIONS` is the whole state machine; `bridge.fc.states` has a class for each state.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 from bridge.fc.profile import FlightController, Spoken
 from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
@@ -33,15 +33,14 @@ TRANSITIONS: Mapping[type[State], _Next] = {
 class FcSession:
     """Runs the state machine of one port.
 
-    `incidents`: numbers for the ids of related log lines. `on_change` is called with each flight controller that is
-    found, and with None when it is lost or cannot be used. `flight`: of the craft that a previous bridge left armed.
+    `on_change` is called with each flight controller that is found, and with None when it is lost or cannot be used.
+    `flight`: of the craft that a previous bridge left armed.
     """
 
     def __init__(
         self,
         port: Port,
         emit: Emit,
-        incidents: Iterator[int],
         on_change: Callable[[FlightController | None, float], None],
         flight: FlightMemory | None,
     ) -> None:
@@ -52,9 +51,6 @@ class FcSession:
         #: The bytes to be written to the port at the state's `speed`, in order.
         self.output = self._port.output
         self._emit = emit
-        self._incidents = incidents
-        #: From the port's opening or a loss until a flight controller is found.
-        self._incident = ""
         self._on_change = on_change
         if flight is not None:
             self._port.family = flight.family
@@ -82,7 +78,7 @@ class FcSession:
             return
         self.handle(PortClosed(why), now)
         if why is not None:
-            self._emit(PortLost(why=why, incident=self._follow_incident()))
+            self._emit(PortLost(why=why))
 
     def restart(self, why: str, now: float) -> None:
         """Forget the flight controller and search again, after a fault in the bridge itself."""
@@ -113,20 +109,13 @@ class FcSession:
         self.state = after(self._port, event, now)
         match event:
             case Found():
-                self._emit(
-                    FcSensed(
-                        speed_baud=event.speed,
-                        protocol=event.spoken.value,
-                        why=event.why,
-                        incident=self._follow_incident(),
-                    )
-                )
+                self._emit(FcSensed(speed_baud=event.speed, protocol=event.spoken.value, why=event.why))
                 self._welcome(event, now)
             case Identified(found=found):
                 self._welcome(found, now)
         if self.state.trouble:
             self._on_change(None, now)
-            self._emit(FcInCommandLine(speed_baud=self.state.speed, incident=self._follow_incident()))
+            self._emit(FcInCommandLine(speed_baud=self.state.speed))
 
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end its conversations."""
@@ -136,7 +125,7 @@ class FcSession:
         if state.trouble or state.controller is not None:
             self._on_change(None, now)
         if state.controller is not None and isinstance(event, Lost):
-            self._emit(FcLost(why=event.why, speed_baud=state.speed, incident=self._follow_incident()))
+            self._emit(FcLost(why=event.why, speed_baud=state.speed))
 
     def _welcome(self, found: Found, now: float) -> None:
         controller = self.state.controller
@@ -148,12 +137,6 @@ class FcSession:
                     kind=controller.profile.name,
                     protocol=found.spoken.value,
                     why=found.why,
-                    incident=self._follow_incident(),
                 )
             )
-            self._incident = ""
             self._on_change(controller, now)
-
-    def _follow_incident(self) -> str:
-        self._incident = self._incident or f"link-{next(self._incidents)}"
-        return self._incident

@@ -13,10 +13,8 @@ Level = Literal["debug", "info", "warning", "error"]
 class BridgeEvent:
     """An event. The log line has its name, its level, and the fields as facts, with the unit in the key.
 
-    >>> FcLost(why="no answer for 3 s", speed_baud=115200, incident="link-3").facts()
-    {'why': 'no answer for 3 s', 'speed_baud': 115200, 'incident': 'link-3'}
-
-    Related events, of a link lost and found, an upload or a push, have the same `incident`.
+    >>> FcLost(why="no answer for 3 s", speed_baud=115200).facts()
+    {'why': 'no answer for 3 s', 'speed_baud': 115200}
     """
 
     name_in_log: ClassVar[str]
@@ -42,7 +40,6 @@ class PortLost(BridgeEvent):
     name_in_log = "fc.port_lost"
     level: Level = "warning"
     why: str
-    incident: str
 
 
 class FcSensed(BridgeEvent):
@@ -53,7 +50,6 @@ class FcSensed(BridgeEvent):
     speed_baud: int | None
     protocol: str
     why: str
-    incident: str
 
 
 class FcFound(BridgeEvent):
@@ -65,7 +61,6 @@ class FcFound(BridgeEvent):
     kind: str
     protocol: str
     why: str
-    incident: str
 
 
 class FcInCommandLine(BridgeEvent):
@@ -74,7 +69,6 @@ class FcInCommandLine(BridgeEvent):
     name_in_log = "fc.in_command_line"
     level: Level = "warning"
     speed_baud: int | None
-    incident: str
 
 
 class FcLost(BridgeEvent):
@@ -84,7 +78,6 @@ class FcLost(BridgeEvent):
     level: Level = "warning"
     why: str
     speed_baud: int | None
-    incident: str
 
 
 class Armed(BridgeEvent):
@@ -147,7 +140,6 @@ class UploadStarted(BridgeEvent):
     name_in_log = "mission.upload_started"
     station: str
     count: int
-    incident: str
 
 
 class UploadEnded(BridgeEvent):
@@ -158,7 +150,6 @@ class UploadEnded(BridgeEvent):
     mission: int | None
     ack: str
     detail: str
-    incident: str
 
 
 class UploadRefused(BridgeEvent):
@@ -169,7 +160,6 @@ class UploadRefused(BridgeEvent):
     station: str
     ack: str
     why: str
-    incident: str
 
 
 class PushStarted(BridgeEvent):
@@ -178,7 +168,6 @@ class PushStarted(BridgeEvent):
     name_in_log = "mission.push_started"
     source: str
     count: int
-    incident: str
 
 
 class PushEnded(BridgeEvent):
@@ -189,7 +178,6 @@ class PushEnded(BridgeEvent):
     mission: int | None
     ack: str
     detail: str
-    incident: str
 
 
 class MissionChangedOnBoard(BridgeEvent):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission operations for the command line, the status page and zenoh. Sans-IO."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +29,6 @@ class LocalMissions:
     _uploads: MissionUploads
     _ground: Ground
     _emit: Emit
-    _incidents: Iterator[int]
 
     @property
     def held(self) -> HeldMission | None:
@@ -61,7 +60,6 @@ class LocalMissions:
         """
         source = plain_text(source)
         owner = object()
-        incident = f"push-{next(self._incidents)}"
         arrived: list[ArrivedMission] = []
 
         def conversation() -> Conversation[DeliveryResult | Refusal]:
@@ -87,12 +85,11 @@ class LocalMissions:
                     mission=result.number if isinstance(result, DeliveryResult) else None,
                     ack=result.ack.name,
                     detail=result.text,
-                    incident=incident,
                 )
             )
             on_done(result, arrived[0] if arrived else None)
 
-        self._emit(PushStarted(source=source, count=len(items), incident=incident))
+        self._emit(PushStarted(source=source, count=len(items)))
         refusal = self._missions.acquire(owner)
         if refusal is None:
             self._missions.run(conversation(), done, now)

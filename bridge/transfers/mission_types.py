@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The three types of lists of MAVLink's mission protocol: missions, fences and rally points. Sans-IO."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -28,15 +28,9 @@ class Transfers(NamedTuple):
 class MissionTypes:
     """`by_type`: the transfers of each MAV_MISSION_TYPE."""
 
-    def __init__(
-        self,
-        missions: MissionService,
-        ground: Ground,
-        emit: Emit,
-        incidents: Iterator[int],
-    ) -> None:
+    def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         def transfers(lists: MissionService) -> Transfers:
-            uploads = MissionUploads(lists, ground, emit, incidents)
+            uploads = MissionUploads(lists, ground, emit)
             return Transfers(lists, uploads, MissionDownloads(lists, ground))
 
         vehicle, runner = missions.vehicle, missions.runner

@@ -217,7 +217,6 @@ class Upload:
 
     sender: Sender
     count: int
-    incident: str
     mission_type: int
     heard_at: float
     number: int = 0

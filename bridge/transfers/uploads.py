@@ -5,7 +5,7 @@ Lists are received in parallel, and written one at a time. Mission Planner loses
 MISSION_COUNT as "continue". Most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -65,17 +65,10 @@ _AGAIN = Replaced("the station started again")
 class MissionUploads:
     """All ground stations' uploads and clears."""
 
-    def __init__(
-        self,
-        missions: MissionService,
-        ground: Ground,
-        emit: Emit,
-        incidents: Iterator[int],
-    ) -> None:
+    def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions
         self._ground = ground
         self._emit = emit
-        self._incidents = incidents
         #: In the order of their MISSION_COUNT.
         self._uploads: list[Upload] = []
         self.answers = UploadAnswers(ground, missions.mission_type)
@@ -221,12 +214,12 @@ class MissionUploads:
         mission_type = self._missions.mission_type if mission_type is None else mission_type
         self.answers.forget(sender)
         if not sender.station.allows(Cost.UPLOAD):
-            # A flood must cost less than the lists that it announces: no incident, no log entry.
+            # A flood must cost less than the lists that it announces: no log entry.
             sender.say(_TOO_MANY_UPLOADS.why)
             self.answers.end(sender, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
         number = sender.number
-        upload = Upload(sender, count, f"upload-{next(self._incidents)}", mission_type, now, number)
+        upload = Upload(sender, count, mission_type, now, number)
         self._uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
@@ -275,7 +268,7 @@ class MissionUploads:
                     # The reply serves all that wait for it.
                     self._missions.run(self._missions.preflight(), self._asked, now)
             case Ready():
-                self._emit(UploadStarted(station=str(upload.sender), count=upload.count, incident=upload.incident))
+                self._emit(UploadStarted(station=str(upload.sender), count=upload.count))
                 self._request(upload, 0)
             case Cancelled() if after is Fixed.END:
                 self._refuse(upload, _cancelled(sentences.CANCELLED()), now)
@@ -334,7 +327,6 @@ class MissionUploads:
                 mission=delivery.number,
                 ack=delivery.ack.name,
                 detail=delivery.text,
-                incident=upload.incident,
             )
         )
 
@@ -379,7 +371,7 @@ class MissionUploads:
 
     def _emit_refusal(self, upload: Upload, refusal: Refusal) -> None:
         name, ack = str(upload.sender), refusal.ack.name
-        self._emit(UploadRefused(station=name, ack=ack, why=refusal.text, incident=upload.incident))
+        self._emit(UploadRefused(station=name, ack=ack, why=refusal.text))
 
 
 def _is_part(items: Sequence[MissionItem], before: Sequence[MissionItem]) -> bool:

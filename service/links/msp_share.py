@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import cast
 
 from bridge.bridge import Bridge
-from bridge.sharing.program import Program
+from bridge.sharing.msp_sharing import Program
 from service.links.gcs_links import LinkError
 from service.settings.addresses import family_of
 from service.settings.settings import ShareSettings

@@ -45,7 +45,7 @@ _SUBJECTS = {
 _UNITS = {"baud": "baud", "s": "s", "m": "m", "mb": "MB"}
 #: Facts that need no name, in this order before the others.
 _PLAIN_FACTS = ("text", "detail", "why", "what")
-_UNSAID = (*_PLAIN_FACTS, "event", "level", "incident", "exception")
+_UNSAID = (*_PLAIN_FACTS, "event", "level", "exception")
 
 
 class LogLine(NamedTuple):
@@ -59,7 +59,7 @@ class LogLine(NamedTuple):
 def sentence(event: Mapping[str, object]) -> str:
     """An event for a person.
 
-    >>> sentence({"event": "fc.lost", "why": "silence", "speed_baud": 9600, "incident": "link-3"})
+    >>> sentence({"event": "fc.lost", "why": "silence", "speed_baud": 9600})
     'Flight controller lost: silence, speed 9600 baud'
     """
     about, _, happened = str(event["event"]).partition(".")

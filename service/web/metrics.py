@@ -93,7 +93,8 @@ class _State(Collector):
                 sizes.add_metric([name], getattr(traffic, f"bytes_{way}"))
             yield sizes
         counters = self._daemon.bridge.counters()
-        yield _gauge("ground_stations", "Ground stations currently heard.", {}, counters.ground_stations)
+        stations = len(self._daemon.report().link.ground_stations)
+        yield _gauge("ground_stations", "Ground stations currently heard.", {}, stations)
         damaged = counters.bad_frames
         yield _counted("ground_damaged_frames", "Frames of ground stations with a wrong checksum.", damaged)
         refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
@@ -102,23 +103,23 @@ class _State(Collector):
         yield refused
 
     def _flight_controller(self) -> Iterator[Metric]:
-        counters, state = self._daemon.bridge.counters(), self._daemon.report().link.state
+        link = self._daemon.report().link
         states = GaugeMetricFamily(_PREFIX + "fc_state", "1 for the link's current state.", labels=["state"])
         for name in dict.fromkeys(each.name for each in TRANSITIONS):
-            states.add_metric([name], float(name == state))
+            states.add_metric([name], float(name == link.state))
         yield states
         dropped = self._daemon.fc.dropped_bytes
         yield _counted(
             "fc_dropped_bytes", "Bytes to the flight controller dropped because its line was too slow.", dropped
         )
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
-        damaged = counters.fc_bad_checksums
+        damaged = link.bad_checksums or 0
         yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)
-        if counters.fc_requests_lost is not None and counters.fc_round_trip_s is not None:
-            lost = counters.fc_requests_lost
+        if link.requests_lost is not None and link.round_trip_ms is not None:
+            lost = link.requests_lost
             yield _counted("fc_lost_requests", "MSP requests that were not answered in time.", lost)
             meaning = "From an MSP request to its reply, as read, smoothed."
-            yield _gauge("fc_round_trip_seconds", meaning, {}, counters.fc_round_trip_s)
+            yield _gauge("fc_round_trip_seconds", meaning, {}, link.round_trip_ms / 1000)
 
     def _vehicle(self) -> Iterator[Metric]:
         for name, (meaning, value) in vehicle_gauges(self._daemon.report()).items():

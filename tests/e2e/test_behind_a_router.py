@@ -20,7 +20,7 @@ async def serve(link: socket.socket) -> Bridge:
     """Run a bridge until a ground station is connected."""
     loop = asyncio.get_running_loop()
     bridge = Bridge(BridgeConfig((None,), is_near=lambda _address: False), loop.time())
-    while not bridge.counters().ground_stations:
+    while not bridge.report(loop.time()).link.ground_stations:
         try:
             async with asyncio.timeout(max(bridge.due - loop.time(), 0.01)):
                 data, sender = await loop.sock_recvfrom(link, 2048)

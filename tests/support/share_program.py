@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from bridge.sharing.program import Program
+from bridge.sharing.msp_sharing import Program
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from tests.support.world import World
 

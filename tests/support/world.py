@@ -35,7 +35,7 @@ from bridge.model.craft import FlightMemory
 from bridge.model.events import BridgeEvent, Level
 from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
 from bridge.model.settings import MemoryOfThisRun, SettingsMemory, TakenBackup
-from bridge.sharing.program import Program
+from bridge.sharing.msp_sharing import Program
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
 from protocols.mission_item import ListIdentity, identify

@@ -101,7 +101,7 @@ def test_a_program_whose_standard_error_is_closed_continues() -> None:
     [
         ({"event": "vehicle.armed"}, "Craft armed"),
         (
-            {"event": "fc.lost", "why": "no answer for 3 s", "speed_baud": 115200, "incident": "link-3"},
+            {"event": "fc.lost", "why": "no answer for 3 s", "speed_baud": 115200},
             "Flight controller lost: no answer for 3 s, speed 115200 baud",
         ),
         (
