@@ -148,10 +148,9 @@ class BoardSettings:
 
         The same request of a client that still waits is not repeated, and does not get an answer of its own.
         """
-        asked = client, name, value
-        changes = (each for each in self._work if isinstance(each, SettingChange))
-        if any((each.client, each.name, each.value) == asked for each in changes):
-            return
+        for each in self._work:
+            if isinstance(each, SettingChange) and (each.client, each.name, each.value) == (client, name, value):
+                return
         change = SettingChange(client, on_done, name=name, value=value)
         if len(self._work) >= _MOST_WAITING:
             change.end(_TOO_MANY, now)
