@@ -88,7 +88,7 @@ def write_param_file(values: Mapping[str, float | str], board: str = "", comment
 
 def is_setting_name(name: str) -> bool:
     """True if a file can hold a setting of this name. No firmware has another."""
-    return _NAME.fullmatch(name) is not None
+    return _NAME.fullmatch(name) is not None and _NUMBER.fullmatch(name) is None
 
 
 def setting_name(name: bytes) -> PlainText:

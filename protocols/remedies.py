@@ -87,7 +87,7 @@ class Fault(Enum):
     # All files
     UNREADABLE_FILE = "{why}", "check the path and its permissions"
     FULL_DISK = "{why}", "delete other files there"
-    NO_FILE = "it is not a regular file", "name another file"
+    NO_FILE = "{why}", "name another file"
     # Links
     NOT_AN_FC = "{text} is not a flight controller connection", "{hint}" + FC_FORMS
     NOT_A_GCS = "{text} is not a ground station connection", "{hint}" + GCS_FORMS

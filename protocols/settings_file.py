@@ -57,7 +57,7 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
     lines: list[_Line] = []
     safehomes: list[Safehome] = []
     unread: list[tuple[int, str]] = []
-    board, profile = "", ("", "")
+    board, profile, is_dump = "", ("", ""), False
     first: dict[str, str] = {}
     selected: dict[str, str] = {}
     if len(data) > _MAX_SIZE:
@@ -83,6 +83,10 @@ def read_settings_file(data: bytes, name: str) -> SavedSettings:
             board = plain_text(command.removeprefix(BOARD))
         elif command and not _FRAME.fullmatch(command):
             unread.append((number, plain_text(command.split()[0])))
+        elif command and not command.startswith("#"):
+            is_dump = True
+    if is_dump and not lines:
+        raise ParamFileError(name, "", *Fault.NO_SETTINGS())
     if not lines:
         params = read_param_file(data, name)
         return SavedSettings(params.values, tuple(safehomes), params.board)

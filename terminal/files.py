@@ -59,13 +59,14 @@ def write_file(path: Path, text: str, failure: type[FileError]) -> None:
     try:
         target = Path(os.path.realpath(path))  # still a link if it leads to itself
         if target.is_symlink() or (target.exists() and not target.is_file()):
-            raise failure(shown_path(path), "", *Fault.NO_FILE())
+            raise failure(shown_path(path), "", *Fault.NO_FILE(why="it is not a regular file"))
         replace_file(target, text.encode(), 0o644)
     except (OSError, ValueError) as error:
         raise _failed(path, error, failure) from None
 
 
 def _failed(path: Path, error: OSError | ValueError, failure: type[FileError]) -> FileError:
-    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-    fault = Fault.FULL_DISK if is_full else Fault.UNREADABLE_FILE
+    number = getattr(error, "errno", None)  # None if the file is too large, or not a regular file
+    others = Fault.NO_FILE if number is None else Fault.UNREADABLE_FILE
+    fault = Fault.FULL_DISK if number in (errno.ENOSPC, errno.EDQUOT) else others
     return failure(shown_path(path), "", *fault(why=reason(error)))

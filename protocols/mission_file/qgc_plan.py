@@ -78,7 +78,7 @@ def write_qgc_plan(items: Sequence[MissionItem]) -> str:
         "vehicleType": _QUADROTOR,
         "cruiseSpeed": 15,
         "hoverSpeed": 5,
-        "plannedHomePosition": [value or 0 for value in home],
+        "plannedHomePosition": [value if value and math.isfinite(value) else 0 for value in home],
         "items": [_entry(item) for item in items[1:]],
     }
     parts = {"geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2}}
@@ -88,7 +88,7 @@ def write_qgc_plan(items: Sequence[MissionItem]) -> str:
 
 def _entry(item: MissionItem) -> dict[str, Any]:
     values = (item.p1, item.p2, item.p3, item.p4, _degrees(item.lat_e7), _degrees(item.lon_e7), item.alt_m)
-    params = [None if value is None or math.isnan(value) else value for value in values]
+    params = [None if value is None or not math.isfinite(value) else value for value in values]
     return {
         "type": "SimpleItem",
         "autoContinue": True,

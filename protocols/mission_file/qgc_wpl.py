@@ -162,4 +162,4 @@ def _number(value: float) -> str:
     """Write the shortest text that reads back as the same number; "NaN" as .NET spells it."""
     if math.isnan(value):
         return "NaN"
-    return f"{value:.0f}" if value.is_integer() and abs(value) < 1e15 else repr(value)
+    return f"{value:.0f}" if float(value).is_integer() and abs(value) < 1e15 else repr(value)

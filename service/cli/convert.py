@@ -11,7 +11,7 @@ from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list, with_home
 from protocols.mission_file import MissionFileError, write_mission_file
 from protocols.mission_file.nav_mission import write_nav_xml
-from protocols.mission_item import MissionItem
+from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.nav import NavRecord
 from protocols.remedies import Fault
 from reports.verdict import Result
@@ -47,6 +47,8 @@ def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, in
         items = load_mission(source, alt_m)
         if alt_m is not None and any(item.alt_m != alt_m for item in items[1:]):
             raise MissionFileError(shown_path(source), "", *Fault.OWN_ALTITUDES())
+        if items[0].command != Command.NAV_WAYPOINT and home is None:
+            raise MissionFileError(shown_path(source), "", *Fault.HOME_MISSING())
         if not (items[0].lat_e7 and items[0].lon_e7):
             home = home or (0, 0)  # which ground stations read as unknown
         items = list(with_home(items, home))
@@ -61,7 +63,7 @@ def _nav_text(items: Sequence[MissionItem]) -> str:
     """The records that an INAV would store. Ends the program with status 1 if it would refuse the list."""
     verdict = check_list(items, NavRules(NavProfile()), None)
     records = [record for record in verdict.records if isinstance(record, NavRecord)]
-    if verdict.findings:
+    if verdict.findings and verdict.ack is not MissionResult.NO_SPACE:
         print_table(mission_table(items, verdict.items, verdict.findings, verdict.sent_seqs))
     if verdict.result is not Result.ACCEPTED:
         fail(verdict.findings[-1].text())

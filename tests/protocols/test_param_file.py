@@ -8,9 +8,16 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from protocols.float32 import single
-from protocols.param_file import ParamFileError, is_equal, read_param_file, shown_value, write_param_file
+from protocols.param_file import (
+    ParamFileError,
+    is_equal,
+    is_setting_name,
+    read_param_file,
+    shown_value,
+    write_param_file,
+)
 
-NAMES = st.text(st.sampled_from("abcXYZ019_-.[]"), min_size=1, max_size=32)
+NAMES = st.text(st.sampled_from("abcXYZ019_-.[]"), min_size=1, max_size=32).filter(is_setting_name)
 FLOATS = st.floats(-(2.0**127), 2.0**127, width=32)
 TEXTS = st.text(st.sampled_from("aZ 0,#.;"), max_size=16)
 WHOLE = st.integers(-(2**31), 2**32 - 1).map(float)
@@ -65,6 +72,7 @@ def test_a_value_that_is_not_a_number_is_left_out() -> None:
         (b"A,1\n\xff,2\n", "line 2", "not a setting's name"),
         ("ä,1\n".encode(), "line 1", "not a setting's name"),
         (b"A\x1b[31m,1\n", "line 1", "not a setting's name"),
+        (b"51.1 0.1\n51.2 0.2\n", "line 1", "not a setting's name"),  # a fence
         (b"QGC WPL 110\n0\t1\n", "line 1", "mission"),
         (b"# only comments\n", "", "no settings"),
     ],

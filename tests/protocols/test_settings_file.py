@@ -116,3 +116,8 @@ def test_a_dump_that_is_written_is_read_again() -> None:
     assert text.splitlines()[3:] == ["# MODE_ANGLE = AUX1 1300-1700", "save"]
     found = read_settings_file(text.encode(), "x")
     assert (found.values, found.board, found.unread) == ({"nav_rth_alt_mode": "FIXED"}, "INAV 8.0.1", ())
+
+
+def test_a_dump_without_a_setting_is_not_read_as_a_param_file() -> None:
+    with pytest.raises(FileError, match=r"this file holds no settings; give a \.param file or a dump"):
+        read_settings_file(b"# INAV/X 7.1.2\nbatch start\nwp 0 0 0 0 0 0 0 0 0\nsave\n", "x")

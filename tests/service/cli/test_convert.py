@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge convert`, run as a command."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,23 @@ def test_a_path_gets_the_altitude_and_home_that_are_given(tmp_path: Path) -> Non
     assert (home.lat_e7, home.lon_e7, first.alt_m) == (514770000, 10000, 30)
 
 
+@pytest.mark.parametrize("ending", ["waypoints", "plan", "mission"])
+def test_whole_numbers_of_inavs_xml_are_written(tmp_path: Path, ending: str) -> None:
+    waiting = '<missionitem no="1" action="POSHOLD_TIME" lat="51.4771" lon="0.0012" alt="15" parameter1="30"/>'
+    target = tmp_path / f"out.{ending}"
+    assert run(tmp_path, "in.mission", f"<mission>{waiting}</mission>", str(target)).exit_code == 0
+    assert read_mission_file(target.read_bytes(), target.name)[1].p1 == 30
+
+
+def test_a_list_without_home_needs_the_option(tmp_path: Path) -> None:
+    text, target = WPL.replace("\t0\t16\t", "\t3\t22\t").format(16), tmp_path / "out.plan"
+    done = run(tmp_path, "in.waypoints", text, str(target))
+    assert done.exit_code == 2
+    assert "the list has no home; --home LAT,LON adds it" in " ".join(done.output.split())
+    assert run(tmp_path, "in.waypoints", text, str(target), "--home", "51.47,0.001").exit_code == 0
+    assert [item.command for item in read_mission_file(target.read_bytes(), "x")] == [16, 22, 16]
+
+
 @pytest.mark.parametrize(
     ("target", "args", "words"),
     [
@@ -57,3 +75,9 @@ def test_a_list_that_inav_refuses_is_not_written(tmp_path: Path) -> None:
     done = run(tmp_path, "in.waypoints", WPL.format(84), str(target))  # its one command is dropped
     assert done.exit_code == 1
     assert not target.exists()
+
+
+def test_an_infinite_altitude_of_a_file_is_unknown_in_a_plan(tmp_path: Path) -> None:
+    target = tmp_path / "out.plan"
+    assert run(tmp_path, "in.waypoints", WPL.format(16).replace("\t15\t", "\tinf\t"), str(target)).exit_code == 0
+    assert math.isnan(read_mission_file(target.read_bytes(), "x")[1].alt_m)
