@@ -23,7 +23,7 @@ import pytest
 
 from bridge.controllers.harakiri.profile import UNPATCHED
 from bridge.fc.states.base import Closed
-from bridge.fc.states.mute import Cli
+from bridge.fc.states.msp import Cli
 from protocols.remedies import Fault
 from service.cli.doctor.checked import Checked, Grade
 from service.cli.doctor.command import examined
