@@ -11,7 +11,6 @@ import string
 
 #: Beyond the reach of guessing.
 LEAST_BITS = 80
-#: The remedy for a weak key.
 #: No character that looks like another, and no capitals to type on a phone.
 _ALPHABET = "abcdefghjkmnpqrstvwxyz23456789"
 _GROUPS, _GROUP_SIZE = 4, 5
