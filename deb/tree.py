@@ -26,7 +26,7 @@ _NOT_THE_PATCH = ("__pycache__", "build", "tests", "sim", "Makefile")
 _UNITS = (
     "naze-bridge.service",
     *(f"naze-bridge-helper-{unit}{kind}" for unit in UNITS for kind in (".socket", "@.service")),
-    *("naze-bridge-captive.socket", "naze-bridge-captive.service", "naze-bridge-update.service"),
+    *("naze-bridge-captive.socket", "naze-bridge-captive.service", "naze-bridge-finish-update.service"),
 )
 _SCHEMAS = "payloads/schemas"
 #: The folders of simulator/ that neither the bridge nor its demonstration uses: naze-bridge-sim.
@@ -59,9 +59,9 @@ def lay_out(
     (root / "usr/bin/naze-bridge").symlink_to("../lib/naze-bridge/bin/naze-bridge")
     for unit in _UNITS:
         _copy(project / "systemd" / unit, root / "usr/lib/systemd/system")
-    wanted = root / "usr/lib/systemd/system/multi-user.target.wants/naze-bridge-update.service"
+    wanted = root / "usr/lib/systemd/system/multi-user.target.wants/naze-bridge-finish-update.service"
     wanted.parent.mkdir()
-    wanted.symlink_to("../naze-bridge-update.service")
+    wanted.symlink_to("../naze-bridge-finish-update.service")
     _copy(project / "systemd/60-naze-bridge.rules", root / "usr/lib/udev/rules.d")
     _copy(project / "systemd/naze-bridge.sysusers", root / "usr/lib/sysusers.d", "naze-bridge.conf")
     (root / "etc/naze-bridge").mkdir(parents=True)

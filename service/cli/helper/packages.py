@@ -125,7 +125,7 @@ def update_outcome(host: Host) -> str:
 def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
     """Install the package. If the bridge does not run with it, return to the previous. Returns the outcome."""
     was_running = _answers()
-    # Moved first, because it may be the previous. naze-bridge-update.service installs it after a power cut.
+    # Moved first, because it may be the previous. naze-bridge-finish-update.service does it after a power cut.
     installing, kept = package.rename(host.path(f"{_FOLDER}/installing.deb")), host.path(PREVIOUS)
     version, former = version_of(installing, machine), pack_installed(kept, host, machine)
     outcome = f"Version {version} was installed; before it was {former}."

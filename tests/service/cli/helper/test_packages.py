@@ -16,6 +16,7 @@ from service.cli.helper.packages import NEW, PREVIOUS, check_package, update, up
 from service.cli.helper.signature import SIGNERS
 from service.cli.setup.change import Machine, SetupError
 from service.machine.host import Host
+from tests.support.programs import REPOSITORY
 from tests.support.release_key import ReleaseKey
 
 _HOST = subprocess.run(["dpkg", "--print-architecture"], capture_output=True, text=True, check=True).stdout.strip()
@@ -136,6 +137,9 @@ def test_it_is_received(tmp_path: Path, host: Host, monkeypatch: pytest.MonkeyPa
     assert host.path(NEW).read_bytes() == unsigned
     assert [path.name for path in host.path(NEW).parent.iterdir()] == ["new.deb"]
     assert started[0].endswith(f"-m service.cli.helper.packages {NEW}")
+    # systemd refuses a transient unit with the name of a unit's file.
+    unit = next(word.removeprefix("--unit=") for word in started[0].split() if word.startswith("--unit="))
+    assert not (REPOSITORY / "systemd" / f"{unit}.service").exists()
 
 
 def new(tmp_path: Path, host: Host) -> Path:
@@ -176,7 +180,7 @@ def test_a_failed_installation_is_reverted(tmp_path: Path, host: Host, monkeypat
 def test_the_package_of_an_interrupted_update_stays_until_it_runs(
     tmp_path: Path, host: Host, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """naze-bridge-update.service installs it at the next start."""
+    """naze-bridge-finish-update.service installs it at the next start."""
 
     class Cut(Apt):
         left = 0
