@@ -60,6 +60,8 @@ _SILENT_S = 1.0
 #: An upload that waits for the end of another transfer looks again at this interval.
 _LOOK_AGAIN_S = 0.05
 _AGAIN = Replaced("the station started again")
+#: The error of 180 degrees in single precision.
+_SINGLE_E7 = 77
 
 
 class MissionUploads:
@@ -376,9 +378,16 @@ class MissionUploads:
 
 def _is_part(items: Sequence[MissionItem], before: Sequence[MissionItem]) -> bool:
     """True if a list is the one before without some items, as Resume Mission writes it, apart from a TAKEOFF."""
-    former = (replace(item, seq=0) for item in before[1:])
-    kept = [replace(item, seq=0) for item in items[1:] if item.command != Command.NAV_TAKEOFF]
-    return 0 < len(kept) < len(before) - 1 and all(item in former for item in kept)
+    former = iter(before[1:])
+    kept = [item for item in items[1:] if item.command != Command.NAV_TAKEOFF]
+    return 0 < len(kept) < len(before) - 1 and all(any(_is_same(item, each) for each in former) for item in kept)
+
+
+def _is_same(item: MissionItem, former: MissionItem) -> bool:
+    """Mission Planner's Resume Mission sends degrees in single precision."""
+    moved = replace(item, seq=former.seq, lat_e7=former.lat_e7, lon_e7=former.lon_e7)
+    pairs = (item.lat_e7, former.lat_e7), (item.lon_e7, former.lon_e7)
+    return moved == former and all(abs((here or 0) - (there or 0)) <= _SINGLE_E7 for here, there in pairs)
 
 
 def _cancelled(why: Happening) -> Refusal:

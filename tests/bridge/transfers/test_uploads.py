@@ -198,6 +198,18 @@ def test_two_simultaneous_uploads_both_succeed() -> None:
     assert [upload.requested for upload in uploads] == [list(range(100)), list(range(30))]
 
 
+@pytest.mark.parametrize("off_e7", [0, 1, 70])
+def test_the_rest_of_a_mission_names_the_way_back_to_the_whole(off_e7: int) -> None:
+    """Mission Planner's Resume Mission writes the items that it has read as MISSION_ITEM, in single precision."""
+    _, station = holding()
+    assert Upload(station, waypoints(20)).run() is A.ACCEPTED
+    station.take()
+    home, *rest = waypoints(20)
+    kept = [home, *(replace(item, lat_e7=(item.lat_e7 or 0) - off_e7) for item in rest[10:])]
+    assert Upload(station, [replace(item, seq=seq) for seq, item in enumerate(kept)]).run() is A.ACCEPTED
+    assert any("missions restore" in text for text in station.texts())
+
+
 def test_a_slow_upload_does_not_delay_others() -> None:
     world, slow = holding()
     receiving(world, slow, waypoints(4, 1), 0)
