@@ -3,10 +3,12 @@
 
 import gc
 import math
+import struct
 
 import pytest
 
 from bridge.fc.fc_settings import ARMED, NO_ANSWER
+from bridge.model.settings import ValueKind
 from protocols.mavlink.dialect import Message
 from protocols.msp.setting_table import SettingCommand
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
@@ -459,3 +461,72 @@ def test_a_station_that_leaves_takes_the_list_along() -> None:
     world.run(2)
     gc.collect()
     assert not [each for each in parameters._dialogues if each.peer == station.peer]
+
+
+def _begin_upload(world: World, station: GroundStation) -> None:
+    station.send(m.MAVLink_mission_count_message(1, 1, 20))
+    world.run(0.1)
+
+
+def _arm(world: World, _station: GroundStation) -> None:
+    world.faults.armed = True
+    world.run(2)
+
+
+def _lose(world: World, _station: GroundStation) -> None:
+    world.power_off()
+    world.run(6)
+
+
+def _hang(world: World, _station: GroundStation) -> None:
+    world.faults.hang = True
+
+
+def _nothing(_world: World, _station: GroundStation) -> None:
+    """The value or the name is the reason."""
+
+
+#: The preparation, the name (empty: a setting of the board), the value (0: a valid one), and MAV_PARAM_ERROR.
+_REFUSALS = {
+    "too high": (_nothing, b"", 1e9, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+    "not a number": (_nothing, b"", math.nan, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+    "the bridge's own": (_nothing, b"RC3_MIN", 7.0, m.MAV_PARAM_ERROR_READ_ONLY),
+    "unknown": (_nothing, b"NO_SUCH_NAME", 7.0, m.MAV_PARAM_ERROR_DOES_NOT_EXIST),
+    "armed": (_arm, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "lost": (_lose, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "without an answer": (_hang, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "during an upload": (_begin_upload, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+}
+
+
+@pytest.mark.parametrize("kind", ["harakiri", "inav", "multiwii"])
+@pytest.mark.parametrize("reason", _REFUSALS)
+def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str) -> None:
+    """QGroundControl repeats it without, and MAVSDK waits."""
+    faults = Faults(boxes=0)
+    world = World(faults=faults, peer=None if kind == "harakiri" else make_board(kind, faults=faults))
+    world.wait_until(lambda w: w.is_found, 20)
+    table = SettingsClient(world).wait_read()
+    station = GroundStation(world)
+    station.stay_connected()
+    names = {value[0] for value in values(parameter_list(world, station))}
+    setting = next(
+        each for each in table if each.name.upper() in names and each.kind is ValueKind.INTEGER and not each.fixed
+    )
+    prepare, name, value, error = _REFUSALS[reason]
+    prepare(world, station)
+    other = setting.minimum + (setting.value == setting.minimum)
+    received = reply_to(world, station, name or setting.name.upper().encode(), value or other, 8)
+    assert [each.error for each in received if each.get_type() == "PARAM_ERROR"] == [error]
+
+
+@pytest.mark.parametrize("value", [2.3, 0.1, 1 / 3])
+def test_a_value_that_is_equal_in_single_precision_is_echoed_exactly(value: float) -> None:
+    """A real number arrives as REAL32, and QGroundControl compares the answer with what it sent."""
+    world, station = settled_world()
+    table = SettingsClient(world).wait_read()
+    setting = next(each for each in table if each.kind is ValueKind.FLOAT and each.accepts(value) and not each.fixed)
+    sent = struct.unpack("<f", struct.pack("<f", value))[0]
+    for _ in range(2):
+        received = reply_to(world, station, setting.name.upper().encode(), value)
+        assert [each.param_value for each in received] == [sent]
