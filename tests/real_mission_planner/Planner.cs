@@ -15,6 +15,7 @@ namespace MissionPlanner {
         static readonly Dictionary<string, Window> windows = new Dictionary<string, Window> {
             { "FlightData", new FlightData() }, { "FlightPlanner", FlightPlanner.instance },
             { "ConfigAccelerometerCalibration", new ConfigAccelerometerCalibration() },
+            { "ConfigHWCompass2", new ConfigHWCompass2() },
             { "PrearmStatus", new PrearmStatus() } };
         static MAVState Vehicle => MainV2.comPort.MAV;
 
@@ -34,6 +35,8 @@ namespace MissionPlanner {
             switch (words[0]) {
                 case "connect": MainV2.instance.Connect(int.Parse(words[1])); break;
                 case "refuse": Screen.Refused = words[1]; break;
+                case "answer": Screen.Answer = words[1]; break;
+                case "joystick": Joystick(int.Parse(words[1])); break;
                 case "press": Press(windows[words[1]], words[2]); break;
                 case "choose": Choose(windows[words[1]], words[2], words[3]); break;
                 case "plan": FlightPlanner.instance.Rows = words.Skip(1).Select(Item).ToList(); break;
@@ -49,6 +52,14 @@ namespace MissionPlanner {
                     break;
                 default: throw new ArgumentException(words[0]);
             }
+        }
+
+        /// The sticks at 20 Hz, as joysticksend of MainV2.
+        static void Joystick(int times) {
+            for (; times > 0; times--, Thread.Sleep(50))
+                MainV2.comPort.sendPacket(new MAVLink.mavlink_rc_channels_override_t {
+                    target_system = Vehicle.sysid, target_component = Vehicle.compid,
+                    chan1_raw = 1500, chan2_raw = 1500, chan3_raw = 1200, chan4_raw = 1500 }, Vehicle.sysid, Vehicle.compid);
         }
 
         /// Full Parameter List, Write: as BUT_writePIDS_Click of ConfigRawParams.

@@ -108,6 +108,8 @@ namespace MissionPlanner {
     public static class Screen {
         /// What the pilot answers to a question that contains this text; every other question is agreed to.
         public static string Refused = "Force";
+        /// What the pilot types into an input box; empty: the pilot accepts the proposed text.
+        public static string Answer = "";
 
         public static void Tell(string kind, string text) {
             lock (typeof(Screen)) Console.WriteLine(kind + "\t" + text.Replace("\r", "").Replace("\n", "\\n"));
@@ -142,7 +144,10 @@ namespace MissionPlanner {
         }
 
         protected static class InputBox {
-            public static DialogResult Show(string title, string question, ref string text) => DialogResult.OK;
+            public static DialogResult Show(string title, string question, ref string text) {
+                text = Screen.Answer == "" ? text : Screen.Answer;
+                return DialogResult.OK;
+            }
         }
 
         protected static class AltInputBox {

@@ -103,6 +103,24 @@ namespace MissionPlanner.GCSViews {
         public bool IsCalibrating => _incalibrate;
     }
 
+    /// The page for the compass. Its timer is pressed like a button.
+    public partial class ConfigHWCompass2 : Window {
+        readonly bool rebootrequired = false;
+        bool CheckReboot() => true;
+        readonly List<MAVLink.MAVLinkMessage> mprog = new List<MAVLink.MAVLinkMessage>(), mrep = new List<MAVLink.MAVLinkMessage>();
+        int packetsub1, packetsub2;
+        class Clock { public int Interval; public void Start() {} public void Stop() {} }
+        readonly Clock timer1 = new Clock();
+        class Bar { public double Value; public string BackColor; }
+        static class Color { public const string Green = "green"; }
+        readonly Bar horizontalProgressBar1 = new Bar(), horizontalProgressBar2 = new Bar(), horizontalProgressBar3 = new Bar();
+        readonly Bar pictureBox1 = new Bar(), pictureBox2 = new Bar(), pictureBox3 = new Bar();
+        readonly Control BUT_OBmagcalaccept = new Control(), BUT_OBmagcalcancel = new Control();
+        class Text { public void Clear() {} public void AppendText(string text) => Screen.Tell("compass", text.Trim()); }
+        readonly Text lbl_obmagresult = new Text();
+        void LogError(Exception error) => log.Error(error);
+    }
+
     /// The window behind "Not Ready to Arm".
     public partial class PrearmStatus : Window {
         DateTime lastRequestTime = DateTime.MinValue, searchTime = DateTime.MinValue;

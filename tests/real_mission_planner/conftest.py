@@ -40,17 +40,17 @@ def planner_program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Pat
 
 @pytest.fixture
 def session(planner_program: tuple[Path, Path], tmp_path: Path) -> Iterator[Sessions]:
-    """Starts a session with a board of these options; `link`: the faults of a LossyUdp."""
+    """Starts a session with a board of these options; `link`: the faults of a LossyUdp. `state`: of the daemon then."""
     with ExitStack() as stack:
         start = Starter(tmp_path, stack)
 
-        def begin(*options: str, link: dict[str, float] | None = None) -> Session:
+        def begin(*options: str, link: dict[str, float] | None = None, state: str = "MSP") -> Session:
             planner = stack.enter_context(RealPlanner(*planner_program, tmp_path, free_port()))
             port = planner.port
             if link is not None:
                 port = stack.enter_context(LossyUdp(("127.0.0.1", port), **link)).address[1]
             board = start.board(*options)
-            start.daemon(str(board.link), (f"udpout:127.0.0.1:{port}",)).wait()
+            start.daemon(str(board.link), (f"udpout:127.0.0.1:{port}",)).wait(state)
             planner.connect()
             return Session(planner, board)
 

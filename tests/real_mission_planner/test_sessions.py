@@ -119,6 +119,52 @@ def test_the_accelerometer_page_ends_with_success(session: Sessions) -> None:
         planner.wait_for("ready", "True", began)
 
 
+def test_the_compass_page_ends_with_success(session: Sessions) -> None:
+    planner, _ = session("--kind", "multiwii")
+    page = "ConfigHWCompass2"
+    planner.press("BUT_OBmagcalstart_Click", page)
+    planner.wait_for("message", "Turn the craft about all axes")
+    planner.wait_for("message", "Compass calibration successful")
+    planner.press("timer1_Tick", page)
+    assert "MAG_CAL_SUCCESS" in planner.current("compass")
+    planner.press("BUT_OBmagcalaccept_Click", page)
+    assert dialogs(planner, 0) == []
+
+
+def test_resume_mission_keeps_the_rest_and_names_the_way_back(session: Sessions) -> None:
+    planner, board = session()
+    rows = plain_plan(24)
+    planner.write(rows)
+    began = planner.now
+    planner.do("answer", "10")
+    planner.do("press", "FlightData", "BUT_resumemis_Click", end="item")
+    planner.wait_for("message", "The whole mission before: see Missions", began)
+    assert len(board.records()) < len(rows)
+    # It asks for the mode every second, for 30 s: the reason stays on the HUD.
+    planner.wait_for("line", "Modes are set with the transmitter switches", began)
+    assert planner.seen("voice", began).count("Modes are set with the transmitter switches") == 1
+    assert dialogs(planner, began) == []
+
+
+def test_a_joystick_is_told_once_that_it_does_not_fly(session: Sessions) -> None:
+    planner, _ = session()
+    planner.do("joystick", 120)
+    assert planner.seen("voice") == ["Joystick ignored: fly with the transmitter"]
+
+
+def test_a_board_armed_before_its_mission_was_read_shows_no_dialog_for_a_read(session: Sessions) -> None:
+    planner, _ = session("--armed", "--tele-prot", "2", state="MAVLink")
+    planner.wait_for("armed", "True")
+    # Mission Planner takes the first item for home.
+    assert len(planner.read()[1]) <= 1
+    planner.wait_for("message", "Armed, mission not known: disarm to read it")
+    assert dialogs(planner, 0) == []
+    time.sleep(ATTEMPT_S)
+    planner.write(plain_plan(24))
+    (dialog,) = dialogs(planner, 0)
+    assert "DENIED" in dialog
+
+
 def test_a_lost_craft_is_neither_ready_nor_silent(session: Sessions) -> None:
     planner, board = session()
     for away, back in (("power off", "power on"), ("unplug", "plug")):

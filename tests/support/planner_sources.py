@@ -55,6 +55,10 @@ _WINDOWS = {
         "GCSViews/ConfigurationView/ConfigAccelerometerCalibration.cs",
         "BUT_calib_accell_Click|receivedPacket|UpdateUserMessage|BUT_level_Click|BUT_simpleAccelCal_Click",
     ),
+    "MissionPlanner.GCSViews.ConfigHWCompass2": (
+        "GCSViews/ConfigurationView/ConfigHWCompass2.cs",
+        "BUT_OBmagcal(start|accept|cancel)_Click|ReceviedPacket|timer1_Tick",
+    ),
     "MissionPlanner.GCSViews.PrearmStatus": (
         "Controls/PrearmStatus.cs",
         "requestchecktimer_Tick|updatetexttimer_Tick",
