@@ -39,7 +39,7 @@ from bridge.model.missions import ARMED, ArrivedMission, Outcome, PendingMission
 from bridge.model.vehicle import GlobalPosition, Vehicle
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
-from bridge.voice.mission_report import has_losses, summary, with_meant_home
+from bridge.voice.mission_report import summary, with_meant_home
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult, identify
 from protocols.msp.nav import FINISHED, NavAction, NavMode, NavStatus
 from reports.verdict import FlownLeg, Result, SentSeqs, Verdict, is_renumbered
@@ -313,7 +313,7 @@ class MissionService:
                 if is_erased and not verdict.findings:
                     why = sentences.ALREADY_CLEAR() if result.unchanged else sentences.CLEARED()
                 else:
-                    is_lossy = has_losses(verdict) or (is_erased and not result.unchanged)
+                    is_lossy = any(each.is_warning for each in verdict.findings) or (is_erased and not result.unchanged)
                     stored = sentences.STORED_WITH_LOSSES if is_lossy else sentences.STORED
                     why = stored(summary(len(arrived.items), verdict, is_unchanged=result.unchanged))
                 if not result.unchanged:

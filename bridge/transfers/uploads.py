@@ -49,6 +49,7 @@ from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from bridge.voice.mission_report import with_meant_home
 from bridge.voice.stations import Kind
+from protocols.float32 import is_single
 from protocols.mavlink.dialect import messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.finding import Finding
@@ -60,8 +61,6 @@ _SILENT_S = 1.0
 #: An upload that waits for the end of another transfer looks again at this interval.
 _LOOK_AGAIN_S = 0.05
 _AGAIN = Replaced("the station started again")
-#: The error of 180 degrees in single precision.
-_SINGLE_E7 = 77
 
 
 class MissionUploads:
@@ -384,10 +383,10 @@ def _is_part(items: Sequence[MissionItem], before: Sequence[MissionItem]) -> boo
 
 
 def _is_same(item: MissionItem, former: MissionItem) -> bool:
-    """Mission Planner's Resume Mission sends degrees in single precision."""
+    """True also if a MISSION_ITEM, which Resume Mission sends, has rounded the coordinates."""
     moved = replace(item, seq=former.seq, lat_e7=former.lat_e7, lon_e7=former.lon_e7)
     pairs = (item.lat_e7, former.lat_e7), (item.lon_e7, former.lon_e7)
-    return moved == former and all(abs((here or 0) - (there or 0)) <= _SINGLE_E7 for here, there in pairs)
+    return moved == former and all(is_single((sent or 0) / 1e7, (held or 0) / 1e7) for sent, held in pairs)
 
 
 def _cancelled(why: Happening) -> Refusal:

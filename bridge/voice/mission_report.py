@@ -27,11 +27,6 @@ def with_meant_home(verdict: Verdict[Any]) -> Verdict[Any]:
     return replace(verdict, findings=tuple(findings))
 
 
-def has_losses(verdict: Verdict[Any]) -> bool:
-    """True if anything is lost or flown differently than it reads."""
-    return bool(verdict.findings) and any(finding.is_warning for finding in verdict.findings)
-
-
 def summary(sent: int, verdict: Verdict[Any], *, is_unchanged: bool = False) -> str:
     """What is stored of `sent` items, the worst findings, and the flight, in one line."""
     start = f"{len(verdict.items)} of {sent} {'unchanged' if is_unchanged else 'stored'}: "

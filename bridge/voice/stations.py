@@ -26,8 +26,6 @@ _MODE_OF_QGC = 192
 #: Mission Planner's Resume Mission repeats a refused command every second, for 30 s. A pilot who tries again gets the
 #: reason again.
 _ATTEMPT_S = 1.5
-#: Beyond this limit a text may be repeated within an attempt.
-_MOST_TEXTS = 16
 #: Bad news is repeated this often, right after a SYS_STATUS if there is one by then.
 _AGAIN_S, _AT_LAST_S = 2.0, 3.5
 _MOST_TIMES = 5
@@ -118,7 +116,7 @@ class BadNews:
     """
 
     def __init__(self) -> None:
-        self._attempts: dict[tuple[bool, str], float] = {}  # oldest first
+        self._attempts: dict[tuple[bool, str], float] = {}
         self._open: list[_Open] = []
         self._nonces = count(1)
         #: SYS_STATUS has replaced the line on Mission Planner's HUD.
@@ -135,11 +133,10 @@ class BadNews:
         A routine request of the program is another attempt than the pilot's.
         """
         key = is_routine, happening.text
-        said_at = self._attempts.pop(key, -inf)
+        self._attempts = {each: at for each, at in self._attempts.items() if now < at + _ATTEMPT_S}
+        is_repeated = key in self._attempts
         self._attempts[key] = now
-        if len(self._attempts) > _MOST_TEXTS:
-            del self._attempts[next(iter(self._attempts))]
-        return now < said_at + _ATTEMPT_S
+        return is_repeated
 
     def said(self, happening: Happening, kind: Kind, now: float) -> Message | None:
         """Note a refusal, or a sentence that lasts, which is being sent. Returns the question to send with it."""
