@@ -11,7 +11,7 @@ from bridge.controllers.table import PROFILES
 from bridge.fc.profile import Profile
 from bridge.gcs.rights import LinkAccess
 from bridge.model.craft import FlightMemory
-from bridge.model.settings import MemoryOfThisRun, SettingsMemory
+from bridge.model.settings import BoardId, SettingsMemory, Value
 
 
 class PassThroughRule(Enum):
@@ -62,4 +62,4 @@ class BridgeConfig:
     unix_time_s: Callable[[float], float | None] = lambda _now: None
     has_log: bool = False
     flight: FlightMemory | None = None
-    settings_memory: SettingsMemory = field(default_factory=MemoryOfThisRun)
+    settings_memory: SettingsMemory = field(default_factory=dict[BoardId, Mapping[str, Value]])

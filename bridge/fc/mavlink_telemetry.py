@@ -18,8 +18,6 @@ from protocols.mavlink.frame import MavlinkFrame
 from protocols.msp.telemetry import Sensor
 
 _HEARTBEAT = m.MAVLINK_MSG_ID_HEARTBEAT
-#: Five lost heartbeats. Only then is a new system id followed, if its component id is the same.
-_GONE_S = 5.0
 #: The autopilot field of a heartbeat's payload, and the value from cameras and gimbals. MAVLink 2 may omit it.
 _AUTOPILOT_AT, _NO_AUTOPILOT = 5, bytes((m.MAV_AUTOPILOT_INVALID,))
 _UNKNOWN_U16, _UNKNOWN_U8 = 0xFFFF, 0xFF
@@ -138,7 +136,7 @@ class MavlinkReadings:
 
 
 class MavlinkTelemetry:
-    """Fills a vehicle from the frames of one autopilot: the first that is heard, until it falls silent."""
+    """Fills a vehicle from the frames of one autopilot: the first that is heard."""
 
     def __init__(self, readings: MavlinkReadings) -> None:
         self._readings = readings
@@ -147,17 +145,13 @@ class MavlinkTelemetry:
         #: The message ids of the kinds that the autopilot sends and that are read; the heartbeats.
         self._known: dict[bytes, int] = {}
         self._beats: set[bytes] = set()
-        self._compid: int | None = None
-        #: When the autopilot counts as gone if no heartbeat of it is heard. A represented board never does.
-        self._gone_at = -math.inf
 
     def take(self, frames: Sequence[bytes], kinds: Sequence[bytes], now: float) -> None:
         """Keep the newest frames. Heartbeats are read at once: arming must be noticed."""
-        if now >= self._gone_at:
-            self._recognise(frames, now)
+        if not self._known:
+            self._recognise(frames)
         self._unread.update(zip(kinds, zip(frames, repeat(now)), strict=False))
         if not self._beats.isdisjoint(kinds):
-            self._gone_at = max(self._gone_at, now + _GONE_S)
             for beat in self._beats.intersection(kinds):
                 self._read(beat, *self._unread.pop(beat))
         if self._readings.is_represented or len(self._unread) > _MAX_KINDS:
@@ -170,20 +164,13 @@ class MavlinkTelemetry:
             if kind in self._known:
                 self._read(kind, frame, heard_at)
 
-    def _recognise(self, frames: Sequence[bytes], now: float) -> None:
+    def _recognise(self, frames: Sequence[bytes]) -> None:
         for frame in map(MavlinkFrame, frames):
-            is_heartbeat = frame.msgid == _HEARTBEAT and self._compid in (None, frame.compid)
-            if self._readings.is_represented or (is_heartbeat and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT):
-                sender = bytes(frame.sender)
-                msgids = self._readings.readers
-                keys = {sender + msgid.to_bytes(size, "little"): msgid for msgid in msgids for size in (1, 3)}
-                if self._known and keys != self._known:
-                    # The values of two autopilots must not mix.
-                    self._readings.vehicle.forget()
-                self._unread.clear()
-                self._known, self._compid = keys, frame.compid
-                self._beats = {kind for kind, msgid in keys.items() if msgid == _HEARTBEAT}
-                self._gone_at = math.inf if self._readings.is_represented else now + _GONE_S
+            is_autopilot = frame.msgid == _HEARTBEAT and frame.payload[_AUTOPILOT_AT:][:1] != _NO_AUTOPILOT
+            if self._readings.is_represented or is_autopilot:
+                sender, msgids = bytes(frame.sender), self._readings.readers
+                self._known = {sender + msgid.to_bytes(size, "little"): msgid for msgid in msgids for size in (1, 3)}
+                self._beats = {kind for kind, msgid in self._known.items() if msgid == _HEARTBEAT}
                 return
 
     def _read(self, kind: bytes, frame: bytes, now: float) -> None:

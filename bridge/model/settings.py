@@ -185,22 +185,9 @@ class TakenBackup:
 
 
 class SettingsMemory(Protocol):
-    """Remembers the settings of each board, even after a restart of the daemon."""
+    """Remembers the settings of each board, even after a restart of the daemon. A dict does so during this run."""
 
-    def recall(self, board: BoardId) -> Mapping[str, Value]:
+    def get(self, board: BoardId, default: Mapping[str, Value], /) -> Mapping[str, Value]:
         """Empty if none are known, or if they may have changed through the bridge since."""
 
-    def keep(self, board: BoardId, values: Mapping[str, Value]) -> None: ...
-
-
-class MemoryOfThisRun:
-    """Remembers settings while the program runs, for commands without a state directory, and tests."""
-
-    def __init__(self) -> None:
-        self._values: dict[BoardId, Mapping[str, Value]] = {}
-
-    def recall(self, board: BoardId) -> Mapping[str, Value]:
-        return self._values.get(board, {})
-
-    def keep(self, board: BoardId, values: Mapping[str, Value]) -> None:
-        self._values[board] = values
+    def __setitem__(self, board: BoardId, values: Mapping[str, Value], /) -> None: ...

@@ -63,8 +63,8 @@ class KnownSettings:
         """Recall the table as last read, if the board is known by its chip's number: an INAV takes 20 s to read."""
         self.board = board
         if self._is_ours:
-            self._memory.keep(board, {})
-        values = self._memory.recall(board)
+            self._memory[board] = {}
+        values = self._memory.get(board, {})
         if board.uid and values and (self.state is None or self.state.board != board):
             self.table = remembered_table(values)
 
@@ -73,7 +73,7 @@ class KnownSettings:
         self.freshness = min(self.freshness, freshness)
         self._is_ours, self.is_saved = True, False
         if self.board is not None:
-            self._memory.keep(self.board, {})  # the daemon may end before the next reading
+            self._memory[self.board] = {}  # the daemon may end before the next reading
 
     def changed(self, settings: Sequence[BoardSetting]) -> None:
         """The settings read back after a change through the bridge."""
@@ -93,14 +93,14 @@ class KnownSettings:
         if self.board is None or not table:
             return None, None
         values = {setting.name: setting.value for setting in table}
-        remembered = self._memory.recall(self.board)
+        remembered = self._memory.get(self.board, {})
         names = tuple(
             name
             for name, value in values.items()
             if repr(remembered.get(name, value)) != repr(value) and name not in self.unsaved
         )
         if values != remembered:
-            self._memory.keep(self.board, values)
+            self._memory[self.board] = values
         elsewhere = SettingsChange(names, now) if names else None
         is_same_board = self.state is not None and self.state.board == self.board
         last = self.state.change if self.state is not None and is_same_board else None

@@ -28,8 +28,6 @@ from protocols.msp.nav import Nav, UnsafeRecord, decode_wp, encode_set_wp
 from protocols.rights import Effect
 from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
 
-#: The requests of all programs.
-_TOTAL = Rate(1000, 1000)
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
 #: An unanswered request occupies the line longer than any other: then no program uses it for a while.
@@ -89,10 +87,10 @@ class Program:
         self._parser = MspParser(takes_low_v2=True)
         self._budget = TokenBucket(_LIMIT)
 
-    def take(self, data: bytes, now: float) -> int | None:
-        """Queue the requests in `data`. The number that were parsed, None if all were dropped because of a flood."""
+    def take(self, data: bytes, now: float) -> bool:
+        """Queue the requests in `data`. Returns False if all were dropped because of a flood."""
         if not self._budget.has(now):
-            return None
+            return False
         if self.close is None:
             # Complete requests only: the rest of a truncated request may be lost.
             self._parser = MspParser(takes_low_v2=True)
@@ -100,7 +98,7 @@ class Program:
         self._budget.spend(len(requests))
         accepted = requests[: _MAX_WAITING - len(self.waiting)]
         self.waiting += [WaitingRequest(frame, now + _WAIT_S) for frame in accepted]
-        return len(requests)
+        return True
 
     def answer(self, waiting: WaitingRequest, reply: MspFrame) -> None:
         self.waiting.remove(waiting)
@@ -117,7 +115,6 @@ class MspSharing:
     _emit: Emit
     _settings: BoardSettings
     _programs: deque[Program] = field(default_factory=deque)  # the next program to have a request forwarded first
-    _total: TokenBucket = field(default_factory=partial(TokenBucket, _TOTAL))
     _forwarded: WaitingRequest | None = None
     #: When the line has carried the last forwarded request and the reply.
     _free_at: float = 0.0
@@ -137,12 +134,9 @@ class MspSharing:
     def received(self, program: Program, data: bytes, now: float) -> None:
         if program not in self._programs:
             return
-        taken = program.take(data, now) if self._total.has(now) else None
-        if taken is None:
+        if not program.take(data, now):
             self.refused["too many requests"] += 1
-            return
-        self._total.spend(taken)
-        if program.waiting:
+        elif program.waiting:
             self.tick(now)
 
     def stop(self) -> None:

@@ -25,10 +25,10 @@ class LastSettings:
         self._boards: dict[str, Mapping[str, Value]] = self._file.load(_read) or {}
         self.close = self._file.close
 
-    def recall(self, board: BoardId) -> Mapping[str, Value]:
-        return self._boards.get(self._key(board), {})
+    def get(self, board: BoardId, default: Mapping[str, Value], /) -> Mapping[str, Value]:
+        return self._boards.get(self._key(board), default)
 
-    def keep(self, board: BoardId, values: Mapping[str, Value]) -> None:
+    def __setitem__(self, board: BoardId, values: Mapping[str, Value], /) -> None:
         key = self._key(board)
         is_known = self._boards.pop(key, None) == values
         self._boards[key] = values

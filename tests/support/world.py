@@ -34,7 +34,7 @@ from bridge.missions.mission_service import MissionEnded
 from bridge.model.craft import FlightMemory
 from bridge.model.events import BridgeEvent, Level
 from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
-from bridge.model.settings import MemoryOfThisRun, SettingsMemory, TakenBackup
+from bridge.model.settings import SettingsMemory, TakenBackup
 from bridge.sharing.msp_sharing import Program
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import MAGIC_V1, MavlinkSplitter
@@ -180,7 +180,7 @@ class World:
             links=links or {},
             is_near=is_near,
             profiles=profiles,
-            settings_memory=memory or MemoryOfThisRun(),
+            settings_memory={} if memory is None else memory,
             has_log=has_log,
         )
         #: The frames for the telemetry log, if there is one.

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import ClassVar
 
-from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController, Profile, Spoken
 from bridge.line.msp_link import MspLink, PendingReplies
 from bridge.line.poll_schedule import PollSchedule
@@ -93,9 +92,6 @@ class Port:
     met_family: str | None = None
     #: The family of the board that `vehicle` describes, which outlives a lost link and a change of protocol.
     family: str | None = None
-
-    #: Remembers which of several autopilots it follows.
-    telemetry: MavlinkTelemetry | None = None
 
     def controller_that_speaks(self, spoken: Spoken) -> FlightController:
         """The flight controller of a protocol that only one profile speaks."""

@@ -83,9 +83,7 @@ class PassThrough(MavlinkLine):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        if port.telemetry is None or self.controller.profile.family != port.family:
-            port.telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
-        self.telemetry = port.telemetry
+        self.telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
         port.meet(self.controller)
         assert event.heard is not None
         heard = [event.heard.raw]
@@ -102,7 +100,7 @@ class HarakiriMavlink(MavlinkLine):
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         super().__init__(port, event, now)
-        port.telemetry = self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
+        self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
         port.meet(self.controller)
         self._msp = MspParser()
         self._probe_due = now + _PROBE_INTERVAL_S

@@ -45,22 +45,6 @@ def test_groups_are_made_from_a_mavlink_autopilot() -> None:
     assert bridge.group(Group.LINK, world.now).state == "MAVLink"
 
 
-def test_an_autopilot_with_a_new_system_id_is_followed() -> None:
-    world, autopilot, _ = passing()
-    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)
-    world.run(2)
-    autopilot.send(m.MAVLink_home_position_message(453838000, 84733000, 0, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
-    world.bridge.watch(Group)
-    autopilot.mavlink.srcSystem = 7
-    autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81 | 128, 4, 4, 3)
-    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 8)
-    autopilot.send(m.MAVLink_attitude_message(1, 0.5, 0, 0, 0, 0, 0))
-    world.run(0.05)
-    assert world.bridge.group(Group.ATTITUDE, world.now).roll_deg == 28.65
-    assert world.bridge.vehicle.home is None
-    assert world.events("vehicle.armed") != []
-
-
 def test_two_autopilots_on_one_line_are_not_mixed() -> None:
     world, autopilot, _ = passing()
     autopilot.heartbeat = m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)

@@ -4,14 +4,14 @@
 A backup is taken when a board is met, when its settings were saved, and when they changed without the bridge.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.model.settings import MemoryOfThisRun
+from bridge.model.settings import BoardId, SettingsMemory, Value
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import Direction, MspFrame, MspParser
 from protocols.msp.mission import MissionCommand
@@ -73,7 +73,7 @@ CASES = {
 }
 
 
-def sealed(make: Callable[[], object], memory: MemoryOfThisRun | None = None) -> tuple[World, GroundStation]:
+def sealed(make: Callable[[], object], memory: SettingsMemory | None = None) -> tuple[World, GroundStation]:
     """A world whose board's settings were read."""
     world = World(speeds=(115200,), peer=make(), memory=memory)
     world.wait_ready(40)
@@ -180,7 +180,7 @@ def test_the_radius_set_and_a_calibration_begun_by_a_station_are_not_reported() 
 
 
 def test_a_change_between_two_runs_is_reported() -> None:
-    memory = MemoryOfThisRun()
+    memory: dict[BoardId, Mapping[str, Value]] = {}
     sealed(naze, memory)
     board = naze()
     world = World(speeds=(115200,), peer=board, memory=memory)
@@ -213,7 +213,7 @@ def test_a_station_that_connects_later_is_informed_until_arming() -> None:
 
 
 def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading() -> None:
-    memory = MemoryOfThisRun()
+    memory: dict[BoardId, Mapping[str, Value]] = {}
     board = naze()
     world, _ = sealed(lambda: board, memory)
     on_the_board(world, SettingCommand.SET_SETTING, set_setting("p_roll", 65))
@@ -225,7 +225,7 @@ def test_a_change_through_the_bridge_survives_a_restart_before_the_next_reading(
 
 def changed_before_the_first_reading() -> World:
     """A bridge through which settings are changed before it has read the board, as another run of it has."""
-    memory = MemoryOfThisRun()
+    memory: dict[BoardId, Mapping[str, Value]] = {}
     board = naze()
     sealed(lambda: board, memory)
     world = World(speeds=(115200,), peer=board, memory=memory)
@@ -257,7 +257,7 @@ def test_a_first_reading_that_is_cut_off_does_not_forget_a_change_through_the_br
 
 
 def test_another_board_is_not_a_change() -> None:
-    memory = MemoryOfThisRun()
+    memory: dict[BoardId, Mapping[str, Value]] = {}
     for make in (naze, inav, multiwii, naze):
         world, _ = sealed(make, memory)
         assert world.events("settings.changed_on_board") == []

@@ -20,32 +20,32 @@ def opened(folder: Path, port: str = "/dev/ttyAMA0") -> LastSettings:
 def test_settings_are_kept_by_number_or_port(tmp_path: Path) -> None:
     file = opened(tmp_path)
     for board in (NUMBERED, NAMELESS):
-        file.keep(board, VALUES)
+        file[board] = VALUES
     file.close()
     here, elsewhere = opened(tmp_path), opened(tmp_path, "/dev/ttyUSB0")
-    assert [here.recall(board) for board in (NUMBERED, NAMELESS)] == [VALUES, VALUES]
-    assert [elsewhere.recall(board) for board in (NUMBERED, NAMELESS)] == [VALUES, {}]
-    assert here.recall(BoardId("INAV 9.2.0", "0011")) == {}
+    assert [here.get(board, {}) for board in (NUMBERED, NAMELESS)] == [VALUES, VALUES]
+    assert [elsewhere.get(board, {}) for board in (NUMBERED, NAMELESS)] == [VALUES, {}]
+    assert here.get(BoardId("INAV 9.2.0", "0011"), {}) == {}
 
 
 def test_the_oldest_boards_are_forgotten(tmp_path: Path) -> None:
     file = opened(tmp_path)
     for number in range(100):
-        file.keep(NUMBERED, {"p_roll": float(number)})
-        file.keep(BoardId("INAV", f"{number:04x}"), VALUES)
+        file[NUMBERED] = {"p_roll": float(number)}
+        file[BoardId("INAV", f"{number:04x}")] = VALUES
     file.close()
     assert len(json.loads((tmp_path / SETTINGS_FILE).read_text())) == 16
-    assert opened(tmp_path).recall(NUMBERED) == {"p_roll": 99.0}
+    assert opened(tmp_path).get(NUMBERED, {}) == {"p_roll": 99.0}
 
 
 @pytest.mark.parametrize("text", ["[]", '{"a": 1}', '{"INAV 9.1.0, 0011": {"p_roll": [1]}}', "{"])
 def test_a_damaged_file_is_forgotten(tmp_path: Path, text: str) -> None:
     (tmp_path / SETTINGS_FILE).write_text(text)
-    assert opened(tmp_path).recall(NUMBERED) == {}
+    assert opened(tmp_path).get(NUMBERED, {}) == {}
 
 
 def test_without_a_folder_settings_last_as_long_as_the_program() -> None:
     file = LastSettings(None, lambda: "sim:")
-    file.keep(NAMELESS, VALUES)
-    assert file.recall(NAMELESS) == VALUES
+    file[NAMELESS] = VALUES
+    assert file.get(NAMELESS, {}) == VALUES
     file.close()

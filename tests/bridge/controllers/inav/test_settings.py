@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+from collections.abc import Mapping
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.model.settings import MemoryOfThisRun
+from bridge.model.settings import BoardId, Value
 from protocols.mission_item import MissionResult
 from protocols.msp.frame import request
 from protocols.msp.inav_settings import COMMON_SET_SETTING, encode_about_name
@@ -45,7 +47,7 @@ def test_a_setting_with_an_impossible_name_is_left_out(monkeypatch: pytest.Monke
 
 def test_a_list_is_complete_right_after_a_start_if_the_board_is_known() -> None:
     """Reading all takes 20 s; the values are those of the last time, and a change since then follows."""
-    memory = MemoryOfThisRun()
+    memory: dict[BoardId, Mapping[str, Value]] = {}
     options = MspOptions(baud=19200)  # as slow as the 800 settings of a whole INAV
     first = World(speeds=(19200,), peer=make_board("inav", options), memory=memory)
     count = len(SettingsClient(first).wait_read(60))
