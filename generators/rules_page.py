@@ -21,31 +21,48 @@ _PLACES = {
     InList.NOT_LAST: "not last",
 }
 
-_CORE = "tests/bridge/controllers/harakiri/test_flight.py"
-_FLOWN = "tests/firmware/test_firmware_core.py::test_random_missions_are_flown_as_the_manual_says"
-_SITL = "tests/real_inav/test_sitl.py"
+_CHECK = "tests/bridge/controllers/harakiri/test_flight.py"
+_CORE, _BOARD = "firmware/tests/test_flight.c", "tests/real_board/test_real_missions.py"
+_ARMING, _LIMITS = "tests/real_inav/test_arming.py", "tests/real_inav/test_limits.py"
+_ZONES, _ROWS = "tests/real_inav/test_zones.py", "tests/real_inav/test_flights.py"
 #: Each rule about the flight, and the test that confirms it by a flight, or a place in INAV 9.1.0 (src/main).
 FLIGHTS = {
     "Harakiri: first place, leg, height, from the craft or the list's home": (
-        f"{_CORE}::test_the_core_refuses_exactly_the_reported_lists"
+        f"{_CHECK}::test_the_core_refuses_exactly_the_reported_lists"
     ),
-    "Harakiri: mission_radius, and random lists": f"{_CORE}::test_exactly_the_refusals_of_the_core_are_reported",
-    "Harakiri: public missions": f"{_CORE}::test_the_core_refuses_no_public_mission_without_a_word",
-    "Harakiri: each command of the table, the order, heights, holds and turns": _FLOWN,
-    "Harakiri: the height of RETURN_TO_LAUNCH, LAND where it is": _FLOWN,
-    "INAV: nav_wp_max_safe_distance, also of a ROI; jumps": (
-        f"{_SITL}::test_it_arms_exactly_with_the_lists_that_the_rules_accept"
+    "Harakiri: mission_radius, and random lists": f"{_CHECK}::test_exactly_the_refusals_of_the_core_are_reported",
+    "Harakiri: public missions": f"{_CHECK}::test_the_core_refuses_no_public_mission_without_a_word",
+    "Harakiri: TAKEOFF only first, LAND only last, no ROI last, only the commands of the table": (
+        f"{_CORE}::test_refusals"
     ),
-    "INAV: nav_max_altitude": f"{_SITL}::test_above_nav_max_altitude_it_would_fly_lower_and_the_list_is_refused",
-    "INAV: nav_max_auto_speed, speed of a leg": f"{_SITL}::test_a_leg_is_flown_at_the_speed_that_is_said",
-    "INAV: RTL that lands, or not": f"{_SITL}::test_a_return_lands_only_if_the_param1_says_so",
-    "INAV: arming in and outside of geozones": f"{_SITL}::test_it_arms_exactly_in_the_zones_that_the_rules_accept",
-    "INAV: geozone on the way, with an action or without": f"{_SITL}::test_a_mission_stops_at_a_zone_as_said",
-    "INAV: geozone with the action RTH": f"{_SITL}::test_it_returns_from_a_zone_with_that_action",
-    "INAV: nav_wp_radius": "source: navigation/navigation.c, isWaypointReached",
-    "INAV: nav_rth_altitude, nav_rth_alt_mode": "source: navigation/navigation.c, updateDesiredRTHAltitude",
-    "INAV: return to a safehome": "source: navigation/navigation.c, findNearestSafeHome",
-    "INAV: landing of an aeroplane by an FW approach": "source: fc/fc_msp.c, 7.1.0 to 9.1.0",
+    "Harakiri: holds, turns, radii, the place and height of RETURN_TO_LAUNCH": f"{_CORE}::check_leave",
+    "Harakiri: heights on the way, fly through or brake, the nose on a ROI, LAND where it is": f"{_CORE}::check_step",
+    "Harakiri: whole lists on the emulated board": f"{_BOARD}::test_a_mission_is_flown",
+    "INAV: first place too far, also of a ROI; jumps": (
+        f"{_ARMING}::test_it_arms_exactly_with_the_lists_that_the_rules_accept"
+    ),
+    "INAV: nav_wp_max_safe_distance": (f"{_ARMING}::test_a_distant_first_place_arms_within_nav_wp_max_safe_distance"),
+    "INAV: arming in and outside of geozones": f"{_ARMING}::test_it_arms_exactly_in_the_zones_that_the_rules_accept",
+    "INAV: LOITER_UNLIM as a hold, 120 records": (
+        f"{_ARMING}::test_it_stores_the_records_that_the_rules_make_and_no_others"
+    ),
+    "INAV: each row of the first table of docs/inav.md": f"{_ROWS}::test_each_row_is_flown_as_documented",
+    "INAV: TAKEOFF is not needed": f"{_LIMITS}::test_it_takes_off_without_a_record_for_it_and_with_low_throttle",
+    "INAV: nav_max_altitude, nav_wp_enforce_altitude": (
+        f"{_LIMITS}::test_a_list_above_nav_max_altitude_is_refused_where_it_would_fly_lower"
+    ),
+    "INAV: heights above sea level": f"{_LIMITS}::test_a_height_counts_from_the_level_that_is_said",
+    "INAV: nav_max_auto_speed, speed of a leg": f"{_LIMITS}::test_a_leg_is_flown_at_the_speed_that_is_said",
+    "INAV: nav_wp_radius": f"{_LIMITS}::test_a_leg_within_nav_wp_radius_counts_as_reached_at_once",
+    "INAV: nav_rth_altitude, nav_rth_alt_mode": f"{_LIMITS}::test_a_return_flies_at_the_height_that_is_said",
+    "INAV: CONDITION_YAW, ROI": f"{_LIMITS}::test_the_nose_turns_as_the_record_says",
+    "INAV: return to a safehome": f"{_LIMITS}::test_a_return_goes_to_the_safehome_that_is_said",
+    "INAV: RTL that lands, or not": f"{_LIMITS}::test_the_last_record_decides_if_a_return_lands",
+    "INAV: geozone on the way, also after a jump; its heights; without an action": (
+        f"{_ZONES}::test_a_mission_stops_at_a_zone_as_said"
+    ),
+    "INAV: geozone with the action RTH": f"{_ZONES}::test_it_returns_from_a_zone_with_that_action",
+    "INAV: landing of an aeroplane by an FW approach": "source: navigation/navigation.c:1848, fwAutolandApproachConfig",
     "INAV: aeroplane, rover and boat": "source: the lines in the second table of docs/inav.md",
 }
 
