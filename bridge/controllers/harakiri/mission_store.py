@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The companion's side of Harakiri's mission extension (docs/msp-mission.md)."""
 
-from abc import ABC
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from zlib import crc32
@@ -72,17 +71,7 @@ _FAILURES = {
 }
 
 
-class _HarakiriStore(FcMissionStore[WpRecord], ABC):
-    """Each record is an item, home too."""
-
-    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        return tuple(items_from_records(records, sent_as))
-
-    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
-        return number if number < len(records) else 0
-
-
-class HarakiriMissions(_HarakiriStore):
+class HarakiriMissions(FcMissionStore[WpRecord]):
     """The mission store of one Harakiri with the mission extension."""
 
     def __init__(self, board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
@@ -164,6 +153,13 @@ class HarakiriMissions(_HarakiriStore):
             if records is not None and identify(records) == info.stored:
                 return records
         return None
+
+    def items(self, records: Sequence[WpRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
+        """Each record is an item, home too."""
+        return tuple(items_from_records(records, sent_as))
+
+    def seq_of(self, records: Sequence[WpRecord], number: int) -> int:
+        return number if number < len(records) else 0
 
     def _read_info(self) -> Conversation[Info | None]:
         # Every waypoint's radius depends on the one in INFO, and the checksum identifies the stored list.
@@ -285,7 +281,7 @@ def _again(status: ReplyStatus) -> PushFailed:
     return PushFailed(_FAILURES.get(status, PushFailure.NO_ANSWER), is_final=False)
 
 
-class HarakiriArmedMissions(_HarakiriStore):
+class HarakiriArmedMissions(HarakiriMissions):
     """A Harakiri that speaks MAVLink, because it is armed: the list is neither read nor written."""
 
     def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
-from bridge.controllers.inav.place_store import InavPlaceStore, take
+from bridge.controllers.inav.places import InavPlaceStore, take
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, ask
 from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position

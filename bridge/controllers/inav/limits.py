@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The settings and the platform of an INAV decide whether it arms with a mission, and how it flies it (docs/inav.md).
 
-Sources of the platforms' table are lines of INAV 9.1.0 (src/main), or flights of tests/real_inav/test_sitl.py; the
-settings' are navigationIsBlockingArming, updateClimbRateToAltitudeController, updateDesiredRTHAltitude,
-navigationRTHAllowsLanding and findNearestSafeHome (src/main/navigation/navigation.c, 6.1.1 to 9.1.0).
+Flown by tests/real_inav. Sources: navigationIsBlockingArming, updateClimbRateToAltitudeController,
+updateDesiredRTHAltitude, navigationRTHAllowsLanding and findNearestSafeHome (navigation.c of 6.1.1 to 9.1.0).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Enum, IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
-from bridge.controllers.inav.safehomes import approach_text
 from bridge.controllers.inav.zone_check import judge_zones
 from bridge.controllers.nav.flown_path import above_home_cm
 from bridge.missions.flown_legs import Departure, FlownPath, Judgement, beyond_plain_limits, first_of, in_metres
@@ -34,7 +32,7 @@ class Platform(Enum):
 
 
 class MissionPart(Enum):
-    """its name in the table, and the field of the item that a message names."""
+    """The name in the table of docs/inav.md, and the field of the item that a message names."""
 
     SPEED = "speed of a leg", "command"
     HEIGHT = "height of a leg", "alt_m"
@@ -43,35 +41,22 @@ class MissionPart(Enum):
     LANDING = "LAND, RTL that lands", "command"
 
 
-class PlatformEffect(NamedTuple):
-    """How it is flown, in a message's words; empty: as sent. source: where that is known from."""
-
-    why: str
-    source: str
-    news: News = News.WARNING
-
-
+_NO_SPEED = "its speed: no effect on {}", News.WARNING
+_NO_TURN = "no effect on {}", News.WARNING
 _ON_THE_GROUND = {
-    MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_rover_boat.c:130: cruise throttle"),
-    MissionPart.HEIGHT: PlatformEffect("Alt: no effect on {}", "flight/mixer.c:171: no altitude control", News.NOTICE),
-    MissionPart.HOLD: PlatformEffect("{} drives on while it holds", "navigation_rover_boat.c:119: stops at the end"),
-    MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),
-    MissionPart.LANDING: PlatformEffect("{} disarms there", "navigation.c:1896", News.NOTICE),
+    MissionPart.SPEED: _NO_SPEED,
+    MissionPart.HEIGHT: ("Alt: no effect on {}", News.NOTICE),
+    MissionPart.HOLD: ("{} drives on while it holds", News.WARNING),
+    MissionPart.TURN: _NO_TURN,
+    MissionPart.LANDING: ("{} disarms there", News.NOTICE),
 }
-PLATFORMS: Mapping[Platform, Mapping[MissionPart, PlatformEffect]] = {
-    Platform.MULTIROTOR: {
-        MissionPart.SPEED: PlatformEffect("", "up to nav_max_auto_speed: flown"),
-        MissionPart.HEIGHT: PlatformEffect("", "flown"),
-        MissionPart.HOLD: PlatformEffect("", "navigation.c:2106"),
-        MissionPart.TURN: PlatformEffect("", "navigation.c:2050"),
-        MissionPart.LANDING: PlatformEffect("", "flown"),
-    },
+#: What a platform ignores or flies otherwise than a multirotor, in a message's words (sources: docs/inav.md).
+FLOWN_OTHERWISE: Mapping[Platform, Mapping[MissionPart, tuple[str, News]]] = {
+    Platform.MULTIROTOR: {},
     Platform.AEROPLANE: {
-        MissionPart.SPEED: PlatformEffect("its speed: no effect on {}", "navigation_multicopter.c:734 only"),
-        MissionPart.HEIGHT: PlatformEffect("", "navigation_fixedwing.c:136"),
-        MissionPart.HOLD: PlatformEffect("{} circles there", "navigation_fixedwing.c:324", News.NOTICE),
-        MissionPart.TURN: PlatformEffect("no effect on {}", "navigation.c:1998 and 2006: multirotors only"),
-        MissionPart.LANDING: PlatformEffect("", "by its FW approach, see below"),
+        MissionPart.SPEED: _NO_SPEED,
+        MissionPart.HOLD: ("{} circles there", News.NOTICE),
+        MissionPart.TURN: _NO_TURN,
     },
     Platform.ROVER: _ON_THE_GROUND,
     Platform.BOAT: _ON_THE_GROUND,
@@ -85,15 +70,6 @@ _BY_AIRFRAME = {
 
 def platform_of(airframe: Airframe | None) -> Platform:
     return Platform.MULTIROTOR if airframe is None else _BY_AIRFRAME.get(airframe, Platform.MULTIROTOR)
-
-
-def flown_otherwise(records: Sequence[NavRecord], platform: Platform) -> Iterable[Judgement]:
-    """One judgement about each part that this platform ignores or flies differently."""
-    for part, effect in PLATFORMS[platform].items():
-        if effect.why:
-            why = effect.why.format(platform.value)
-            cases = [(place, why) for place, record in enumerate(records) if part in _parts(record)]
-            yield from first_of(cases, part.value[1], effect.news)
 
 
 def _parts(record: NavRecord) -> Iterable[MissionPart]:
@@ -150,6 +126,7 @@ class InavLimits:
     safehomes: tuple[Safehome, ...] = ()
     zones: tuple[Geozone, ...] = ()
     selected: int = 1
+    version: tuple[int, int, int] = (9, 1, 0)
     platform: Platform = Platform.MULTIROTOR
     approach: FwApproach | None = None
     unknown: tuple[str, ...] = ("nav_wp_max_safe_distance", "nav_max_altitude", "nav_rth_altitude")
@@ -191,7 +168,9 @@ class InavLimits:
         within = f"within nav_wp_radius ({short_m:g} m): it may count as reached at once"
         whys = [(leg.cause, f"{leg.length_m:.1f} m from the waypoint before, {within}") for leg in close]
         yield from first_of(whys, "lat_e7", News.NOTICE)
-        yield from flown_otherwise(records, self.platform)
+        for part, (why, news) in FLOWN_OTHERWISE[self.platform].items():
+            cases = [place for place, record in enumerate(records) if part in _parts(record)]
+            yield from first_of([(place, why.format(self.platform.value)) for place in cases], part.value[1], news)
         if self.platform is Platform.MULTIROTOR:
             yield from self._speeds(records)
         yield from judge_zones(self.zones, path, departure)
@@ -220,17 +199,20 @@ class InavLimits:
         limit_cm = self.nav_max_altitude
         if not limit_cm or self.nav_wp_enforce_altitude:
             return
-        unknown = []
+        unknown, higher = [], []
         for place, record in enumerate(records):
             if record.action not in LEGS:
                 continue
             height_cm = above_home_cm(record, departure)
             if height_cm is None:
                 unknown.append((place, "too high? home's Alt is unknown"))
+            elif height_cm > limit_cm and self.version < _LIMITS_MISSIONS:
+                higher.append((place, f"{height_cm / 100:g} m, over nav_max_altitude {limit_cm / 100:g} m"))
             elif height_cm > limit_cm:
                 why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
                 yield Judgement(place, "alt_m", why, None)
         yield from first_of(unknown, "alt_m")
+        yield from first_of(higher, "alt_m")
 
     def _speeds(self, records: Sequence[NavRecord]) -> Iterable[Judgement]:
         speeds = [(place, leg_speed(record, 0)) for place, record in enumerate(records) if record.action in LEGS]
@@ -272,19 +254,22 @@ class InavLimits:
 
 
 def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str, without: str) -> Judgement:
-    """Items have no place for an approach: a second height, two headings, a circuit (docs/inav.md)."""
     if approach and approach.directions():
-        return Judgement(place, "command", f"lands {where}by {approach_text(approach)}", News.NOTICE)
+        headings = " or ".join(map(str, approach.directions()))
+        why = f"lands {where}by FW approach {approach.number}: heading {headings}"
+        return Judgement(place, "command", why, News.NOTICE)
     why = f"circles down {otherwise} and lands in any direction ({without})"
     return Judgement(place, "command", why, News.WARNING)
 
 
+#: The first version whose missions do not climb above nav_max_altitude.
+_LIMITS_MISSIONS = 8, 0, 0
 _NO_APPROACHES = "no FW approach before INAV 7.1"
 _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
     "safehome_usage_mode": SafehomeUsageMode,
 }
-_OTHER_FIELDS = ("safehomes", "zones", "selected", "platform", "approach", "unknown")
+_OTHER_FIELDS = ("safehomes", "zones", "selected", "version", "platform", "approach", "unknown")
 #: Those that decide if a list is flown, and how high and fast.
 DECISIVE_NAMES = (
     *("nav_wp_max_safe_distance", "nav_max_altitude", "nav_wp_enforce_altitude"),

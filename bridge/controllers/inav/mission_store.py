@@ -3,6 +3,10 @@
 
 The store holds up to nine missions in a row, each ended by the flag LAST. Disarmed, all missions are counted and read.
 Armed, only the loaded mission. Writing record 1 wipes them all, so they are written again behind a new list.
+
+Set waypoint makes an INAV that flies the mission fly to another of the records (MSP2_INAV_SET_WP_INDEX). INAV checks
+that it is armed, in waypoint mode, and that the list has the record. It also accepts a new record while it lands and
+lands nevertheless, and would take off again after a landing: both are refused here.
 """
 
 from collections.abc import Sequence
@@ -10,17 +14,16 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 
-from bridge.controllers.inav.fly_to import FLOWN_TO, fly_to
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
 from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits, Platform, platform_of
-from bridge.controllers.inav.safehomes import read_approaches, read_safehomes, with_approaches, write_approaches
+from bridge.controllers.inav.places import read_approaches, read_safehomes, with_approaches, write_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.inav.zone_check import zone_ahead
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.mission_store import NOTHING, NavMissions
 from bridge.controllers.nav.rules import Mission, NavProfile
 from bridge.fc.profile import FlightController
-from bridge.line.conversation import Conversation, LinkLost, ask
+from bridge.line.conversation import Conversation, LinkLost, Pause, ask
 from bridge.missions.fc_mission_store import (
     FliesToItems,
     Loading,
@@ -30,22 +33,37 @@ from bridge.missions.fc_mission_store import (
     PushResult,
     StoreReport,
 )
+from bridge.model.craft import ARM_BOX, MISSION_BOXES, names_of_active
 from bridge.model.ground_track import Place
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
+from bridge.voice import sentences
+from protocols.mission_item import MissionResult
+from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
+from protocols.msp.inav import STATUS_SIZE, decode_inav_status
 from protocols.msp.inav_places import APPROACHES, MISSION_APPROACH, FwApproach
 from protocols.msp.nav import (
+    FINISHED,
     INFO_SIZE,
+    LANDING,
     LAST,
+    LEGS,
     LOAD_REQUEST,
+    NAV_STATUS_SIZE,
     SAVE_REQUEST,
     SELECTED_REQUEST,
+    SET_WP_INDEX,
     SETTING,
     Nav,
+    NavAction,
     NavInfo,
+    NavMode,
     NavRecord,
+    NavStatus,
     decode_info,
+    decode_nav_status,
+    encode_fly_to,
 )
 from protocols.msp.nav_items import item_seqs
 
@@ -202,7 +220,8 @@ class InavMissions(NavMissions, FliesToItems):
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
             limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform, unknown=())
-            self._limits = limits.with_settings(values)
+            version = self._board.version or limits.version
+            self._limits = replace(limits, version=version).with_settings(values)
 
     def _read_decisive_limits(self) -> Conversation[None]:
         """Another client may have changed them unnoticed: read again before each Write, a few requests."""
@@ -311,3 +330,60 @@ def _split(records: Sequence[NavRecord]) -> list[Mission]:
             missions.append(tuple(records[start:end]))
             start = end
     return missions
+
+
+#: Actions that it flies to; INAV executes the others and continues to the next of these.
+FLOWN_TO = LEGS | {NavAction.RTH}
+#: The first version with the request.
+_FIRST = 9, 1, 0
+_LOOKS, _LOOK_INTERVAL_S = 5, 0.1
+
+
+_NOT_FLOWN = Refusal(MissionResult.DENIED, sentences.SET_IN_FLIGHT())
+_LANDS = Refusal(MissionResult.DENIED, sentences.SET_WHILE_LANDING())
+_CHANGED = Refusal(MissionResult.DENIED, sentences.SET_ON_CHANGED_LIST())
+_UNCHANGED = Refusal(MissionResult.ERROR, sentences.SET_WITHOUT_EFFECT())
+_NO_ANSWER = Refusal(MissionResult.ERROR, sentences.SET_UNANSWERED())
+
+
+def fly_to(
+    number: int, record: NavRecord, held: Conversation[NavRecord | None], board: FlightController
+) -> Conversation[Refusal | None]:
+    """Make INAV fly to record `number`. Returns None if it does. held: reads the record that INAV has there."""
+    reply = yield from ask(request(Msp.INAV_STATUS), Msp.INAV_STATUS, STATUS_SIZE)
+    state = None if reply is None else decode_inav_status(reply.payload)
+    active = names_of_active(state.box_flags, board.boxes) if state else set()
+    status = yield from _ask_status()
+    if state is None or status is None:
+        return _NO_ANSWER
+    if ARM_BOX not in active or not active & MISSION_BOXES or status.mode != NavMode.MISSION:
+        return _NOT_FLOWN
+    if _is_down(status):
+        return _LANDS
+    if (yield from held) != record:
+        return _CHANGED
+    reply = yield from ask(encode_fly_to(number), SET_WP_INDEX, 0, tries=1)
+    if reply is not None and reply.direction is Direction.ERROR:
+        return _refused(board)
+    for _ in range(_LOOKS):
+        status = yield from _ask_status()
+        if status is not None and status.number == number:
+            return None
+        yield Pause(_LOOK_INTERVAL_S)
+    return _NO_ANSWER if reply is None or status is None else _UNCHANGED
+
+
+def _ask_status() -> Conversation[NavStatus | None]:
+    reply = yield from ask(request(Msp.NAV_STATUS), Msp.NAV_STATUS, NAV_STATUS_SIZE)
+    return None if reply is None else decode_nav_status(reply.payload)
+
+
+def _is_down(status: NavStatus) -> bool:
+    return status.state in LANDING or (status.error == FINISHED and status.action == NavAction.LAND)
+
+
+def _refused(board: FlightController) -> Refusal:
+    if board.version is not None and board.version < _FIRST:
+        older = sentences.SET_ON_NEWER_INAV(".".join(map(str, board.version)))
+        return Refusal(MissionResult.DENIED, older)
+    return Refusal(MissionResult.DENIED, sentences.SET_REFUSED_BY_INAV())

@@ -2,13 +2,13 @@
 """The rules for a mission list on INAV and MultiWii NAV (docs/inav.md)."""
 
 import math
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
 from bridge.controllers.nav.flown_path import flown_size, fly, jump_within_jump, lands_after_rth
-from bridge.controllers.nav.related_items import Jumps, LegSpeed, placed_landing
 from bridge.controllers.nav.rules import (
     HOLD,
     LANDS,
@@ -16,11 +16,13 @@ from bridge.controllers.nav.rules import (
     NAV_RULES,
     REPEATS,
     AltitudeUse,
+    Jumps,
+    LegSpeed,
     Mission,
     NavProfile,
     NavRule,
+    placed_landing,
 )
-from bridge.controllers.nav.unshown import flies_home, keep_unshown
 from bridge.missions.flown_legs import Departure, Point, beyond_plain_limits
 from bridge.missions.list_check import (
     SEA_LEVEL_FRAMES,
@@ -35,7 +37,7 @@ from bridge.missions.list_check import (
 )
 from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
-from protocols.msp.nav import LAST, LEGS, TURNS, NavAction, NavRecord
+from protocols.msp.nav import FLY_HOME, LAST, LEGS, TURNS, NavAction, NavRecord
 from protocols.msp.nav_items import GROUND_SPEED, home_item, item_seqs, items_from_records, sent_seqs
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
 from reports.verdict import Result, Verdict
@@ -98,9 +100,7 @@ class NavCheck(ListCheck):
         elif special := self._special.get(item.command):
             rejection = refuse_frame(item, needs_position=False) or special(item)
         else:
-            takes_off = item.command == Command.NAV_TAKEOFF
-            why = "it does not take off by itself" if takes_off else "not supported"
-            rejection = self._drop(item, "command", item.command, why)
+            rejection = self._drop(item, "command", item.command, "not supported")
         room = self._profile.capacity - sum(map(len, self._rules.others))
         if rejection is None and len(self._records) > room:
             beside = " with the board's other missions: delete one" if self._rules.others else ""
@@ -131,7 +131,7 @@ class NavCheck(ListCheck):
                 self._records[-1] = replace(self._records[-1], p1=LANDS.high)
                 return self._drop(item, "command", item.command, "the RTL before it now lands")
             item = placed_landing(item, self._records, self._note, partial(self._note, news=News.WARNING))
-        if rule.position and (missing := missing_coordinate(item)) and not self._flew_home():
+        if rule.position and (missing := missing_coordinate(item)):
             return self._drop(item, *missing, "no Lat/Long")
         if rejection := refuse_frame(item, needs_position=rule.position):
             return rejection
@@ -144,11 +144,6 @@ class NavCheck(ListCheck):
             self._no_position(item)
         self._keep(item, self._record(item, rule, p1))
         return None
-
-    def _flew_home(self) -> bool:
-        """True if the record to be replaced has no place either: INAV flies home."""
-        place, current = len(self._records), self._rules.current
-        return place < len(current) and flies_home(current[place])
 
     def _hold(self, item: MissionItem) -> int:
         allowed = self._profile.longest_hold
@@ -273,14 +268,12 @@ class NavCheck(ListCheck):
         return Departure(craft, home, self._home.alt_m or None, first)
 
     def _conclude(self) -> Verdict[NavRecord]:
-        kept, lost = keep_unshown(self._records, self._rules.current)
-        records = (*kept[:-1], replace(kept[-1], flag=LAST))
+        records = (*self._records[:-1], replace(self._records[-1], flag=LAST))
         items = items_from_records(records, self._home, self._sent_as)
-        if lost:
-            why = f"Lost with the old list, as no MAVLink item can show it: {lost}"
-            self._findings.append(
-                Finding(None, "count", len(self._rules.current), len(records), why, news=News.WARNING)
-            )
+        if lost := Counter(name for old in self._rules.current for name in _unshown(old)):
+            names = ", ".join(f"{name} ({count})" for name, count in lost.items())
+            why = f"Lost with the old list, as no MAVLink item can show it: {names}"
+            self._findings.append(Finding(None, "count", None, None, why, news=News.WARNING))
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
         flight = self._path.facts(), self._path.shown(self._seqs), self._assumed
@@ -336,6 +329,16 @@ class NavCheck(ListCheck):
         for name in (*names, "alt_m"):
             self._fit(item, name, UNUSED, News.NONE)
         self._no_position(item)
+
+
+def _unshown(record: NavRecord) -> Iterable[str]:
+    """What another planner set in a record, and an item cannot show, if it changes a flight."""
+    if record.p3 & ~1 and record.action in LEGS:
+        yield "user actions"
+    if record.flag == FLY_HOME:
+        yield "fly home"
+    if record.action == NavAction.LAND and record.p2:
+        yield "ground elevation"
 
 
 def _centimetres(height_m: float) -> int:

@@ -79,31 +79,13 @@ def above_home_cm(record: NavRecord, departure: Departure) -> int | None:
 
 
 def flown_size(records: Sequence[NavRecord]) -> int:
-    """The number of records up to the RTH that ends the mission: later items that no jump reaches are not counted."""
-    starts, end = {0}, -1
-    while True:
-        before, end = end, max(_reached(records, starts))
-        if end == before:
-            break
-        # Even a jump that is never flown needs a target, or INAV does not arm.
-        starts |= {record.p1 - 1 for record in records[: end + 1] if record.action == NavAction.JUMP}
-    return end + 1 if records[end].action == NavAction.RTH else len(records)
-
-
-def _reached(records: Sequence[NavRecord], starts: set[int]) -> set[int]:
-    reached: set[int] = set()
-    ahead = list(starts)
-    while ahead:
-        place = ahead.pop()
-        if place in reached or place >= len(records):
-            continue
-        reached.add(place)
-        record = records[place]
-        if record.action == NavAction.JUMP and record.p2:
-            ahead.append(record.p1 - 1)
-        if record.action != NavAction.RTH and (record.action, record.p2) != (NavAction.JUMP, _ENDLESS):
-            ahead.append(place + 1)
-    return reached
+    """The number of records up to the RTH that ends the mission, unless a JUMP leads beyond it."""
+    for end, record in enumerate(records, 1):
+        if record.action == NavAction.RTH and all(
+            each.p1 <= end for each in records[:end] if each.action == NavAction.JUMP
+        ):
+            return end
+    return len(records)
 
 
 def lands_after_rth(records: Sequence[NavRecord]) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from bridge.controllers.inav.telemetry import INAV_POLLS
+from bridge.controllers.inav.profile import INAV_POLLS
 from bridge.line.msp_link import PROBE, RESYNC
 from bridge.line.poll_schedule import BOX_POLL, NAV_POLL, POLLS
 from protocols.mission_item import ListIdentity, pack_records

@@ -3,7 +3,7 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.controllers.harakiri.mavlink_readings import HarakiriReadings
+from bridge.controllers.harakiri.profile import HarakiriReadings
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.model.vehicle import GlobalPosition, Height, Orientation, Signal, Vehicle
 from protocols.mavlink.dialect import Message

@@ -7,7 +7,7 @@ from struct import pack
 
 import pytest
 
-from bridge.controllers.inav.fly_to import fly_to
+from bridge.controllers.inav.mission_store import fly_to
 from bridge.controllers.inav.profile import PROFILE
 from bridge.fc.profile import FlightController
 from bridge.line.conversation import Conversation, Receive

@@ -24,7 +24,7 @@ from tests.support.settings_client import SettingsClient
 NORTH = 8983
 LAND = item(Command.NAV_LAND)
 APPROACH = FwApproach(8, 5000, 350, turns_right=False, headings=(90, -10), is_above_sea=False)
-BY_APPROACH_3 = "FW approach 3: heading 90 or 270 or 10, from 50 m to the ground at 3.5 m above home"
+BY_APPROACH_3 = "FW approach 3: heading 90 or 270 or 10"
 NO_SAFEHOME = "circles down at home and lands in any direction (no safehome within safehome_max_distance, 200 m)"
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
@@ -93,6 +93,15 @@ def test_a_leg_that_inav_would_fly_lower_rejects_the_list() -> None:
     assert texts(above_sea, nav_max_altitude=5000) == []
 
 
+def test_inav_before_8_flies_above_nav_max_altitude() -> None:
+    assert texts(WP, nav_max_altitude=4000, version=(7, 1, 2)) == ["WP 1: 50 m, over nav_max_altitude 40 m"]
+    assert texts(WP, nav_max_altitude=5000, version=(7, 1, 2)) == []
+    board, _, station = board_with(version="7.1.2")
+    board._firmware._settings["nav_max_altitude"] = 5000  # type: ignore[union-attr]
+    assert Upload(station, [HOME, replace(NEAR, alt_m=20.0), replace(FAR, alt_m=60.0)]).run() is ACCEPTED
+    assert "WP 2: 60 m, over nav_max_altitude 50 m" in " ".join(station.texts())
+
+
 def test_waypoints_within_the_radius_are_named() -> None:
     close = replace(WP, lat_e7=LAT + NORTH // 50)
     (news,) = texts(WP, close, nav_wp_radius=500)
@@ -147,10 +156,10 @@ def test_another_selected_mission_is_named() -> None:
             APPROACH._replace(headings=(0, 0)),
             "circles down here and lands in any direction (FW approach 8 has no heading)",
         ),
-        (APPROACH, "lands by FW approach 8: heading 90 or 270 or 10, from 50 m to the ground at 3.5 m above home"),
+        (APPROACH, "lands by FW approach 8: heading 90 or 270 or 10"),
         (
             APPROACH._replace(headings=(0, 360), is_above_sea=True),
-            "lands by FW approach 8: heading 0 or 180, from 50 m to the ground at 3.5 m above sea level",
+            "lands by FW approach 8: heading 0 or 180",
         ),
     ],
 )
@@ -227,7 +236,7 @@ def test_an_aeroplanes_approach_is_read_and_the_mission_loaded_because_only_then
     client.wait_read()
     client.change("nav_wp_radius", 200)
     assert Upload(station, [HOME, NEAR, replace(LAND, lat_e7=LAT + NORTH)]).run() is ACCEPTED
-    assert "WP 2: lands by FW approach 8: heading 90, from 40 m to the ground at 0 m" in " ".join(station.texts())
+    assert "WP 2: lands by FW approach 8: heading 90" in " ".join(station.texts())
     assert firmware._mission._loaded == 1  # type: ignore[union-attr]
     assert firmware._places.answer(FW_APPROACH, bytes((MISSION_APPROACH,))) == approach  # type: ignore[union-attr]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.controllers.inav.safehomes import RallyRules, read_approaches, read_safehomes
+from bridge.controllers.inav.places import RallyRules, read_approaches, read_safehomes
 from bridge.line.conversation import Conversation
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionResult

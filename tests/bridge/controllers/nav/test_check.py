@@ -15,7 +15,7 @@ from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mavlink.codec import item_from_float_message
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.nav import ENDLESS_S, FLY_HOME, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
+from protocols.msp.nav import ENDLESS_S, FLY_HOME, LAST, LEGS, NavAction, NavRecord, decode_wp, encode_set_wp
 from protocols.msp.nav_items import home_item, items_from_records
 from reports.finding import DROPPED, News
 from reports.verdict import Result
@@ -280,13 +280,11 @@ def test_every_difference_is_reported(sent: list[MissionItem]) -> None:
 speeds = st.sampled_from([0, 50, 500])
 heights = st.integers(100, 20_000)
 places = {"lat_e7": st.integers(LAT, LAT + 9000), "lon_e7": st.integers(LON, LON + 9000), "alt_cm": heights}
-flags = st.sampled_from([0, 0, FLY_HOME])
-p3s = st.integers(0, 31)
+p3s = st.integers(0, 1)
 foreign_legs = st.one_of(
-    st.builds(NavRecord, st.just(A.WAYPOINT), **places, p1=speeds, p3=p3s, flag=flags),
-    st.builds(NavRecord, st.just(A.WAYPOINT), alt_cm=heights, p1=speeds, p3=p3s, flag=flags),
-    st.builds(NavRecord, st.just(A.POSHOLD_TIME), **places, p1=st.integers(0, 900), p2=speeds, p3=p3s, flag=flags),
-    st.builds(NavRecord, st.just(A.LAND), **places, p1=speeds, p2=st.integers(-400, 4000), p3=p3s, flag=flags),
+    st.builds(NavRecord, st.just(A.WAYPOINT), **places, p1=speeds, p3=p3s),
+    st.builds(NavRecord, st.just(A.POSHOLD_TIME), **places, p1=st.integers(0, 900), p2=speeds, p3=p3s),
+    st.builds(NavRecord, st.just(A.LAND), **places, p1=speeds, p3=p3s),
 )
 foreign_turns = st.one_of(
     st.builds(NavRecord, st.just(A.SET_POI), **places),
@@ -296,8 +294,35 @@ foreign_turns = st.one_of(
 
 @given(st.lists(st.one_of(foreign_legs, foreign_turns), max_size=8), foreign_legs)
 def test_another_planners_list_is_written_back_unchanged(before: list[NavRecord], last: NavRecord) -> None:
-    """User actions, legs that fly home and a landing's ground elevation appear in no item but are kept."""
     held = (*before, replace(last, flag=0xA5))
     again = check_list(items_from_records(held, home_item((LAT, LON))), NavRules(NavProfile(), held))
     changes = [finding for finding in again.findings if finding.was != finding.becomes]
     assert (again.result, changes, again.records) == (Result.ACCEPTED, [], held)
+
+
+def test_any_record_of_another_planner_is_shown() -> None:
+    records = [
+        NavRecord(99, 1, 2, 3),
+        NavRecord(A.JUMP, p1=77),
+        NavRecord(A.WAYPOINT, p1=-5),
+        NavRecord(A.SET_HEAD, p1=400),
+    ]
+    shown = items_from_records(records, home_item(None))
+    assert [(it.command, it.p1) for it in shown] == [(16, 0), (0, 99), (177, 0), (16, 0), (197, 0)]
+
+
+@pytest.mark.parametrize(
+    ("record", "lost"),
+    [
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=2), "user actions (1)"),
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, flag=FLY_HOME), "fly home (1)"),
+        (NavRecord(A.LAND, LAT, LON, 3000, p2=120, p3=1), "ground elevation (1)"),
+        (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
+    ],
+)
+def test_values_that_no_item_shows_are_lost_with_a_warning(record: NavRecord, lost: str) -> None:
+    held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
+    items = list(items_from_records(held, home_item((LAT, LON))))
+    verdict = check_list(items, NavRules(NavProfile(), held))
+    expected = [(News.WARNING, f"Lost with the old list, as no MAVLink item can show it: {lost}")] if lost else []
+    assert [(finding.news, finding.text()) for finding in verdict.findings] == expected

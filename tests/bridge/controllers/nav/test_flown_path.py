@@ -20,7 +20,7 @@ def jump(to: int, repeats: int = 1) -> NavRecord:
         ([WP, RTH], 2),
         ([WP, RTH, WP, WP], 2),
         ([WP, jump(4), RTH, WP, RTH, WP], 5),
-        ([WP, jump(1, -1), RTH, WP], 4),
+        ([WP, jump(1, -1), RTH, WP], 3),
         ([WP, jump(4, 0), RTH, WP], 4),
     ],
 )

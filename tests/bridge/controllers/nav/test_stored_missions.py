@@ -12,10 +12,10 @@ from bridge.model.missions import Outcome, Refusal
 from protocols.mission_item import MissionResult
 from protocols.msp.commands import Msp
 from protocols.msp.frame import MspParser
-from protocols.msp.nav import LAST, Nav, NavAction
+from protocols.msp.nav import LAST, Nav
 from simulator.board.msp_board import MspBoard
 from simulator.board.msp_options import MspOptions
-from simulator.board.nav_waypoint import FLAG_HOME, FLAG_LAST, WAYPOINT_SIZE, NavWaypoint
+from simulator.board.nav_waypoint import WAYPOINT_SIZE, NavWaypoint
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.mission import CAPACITY, EEPROM_SIZE
@@ -24,7 +24,6 @@ from simulator.inav.settings import SETTINGS_SIZE
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with, without_home
 from tests.bridge.controllers.nav.test_mission_store import packed, plan
 from tests.support.conversations import Download, Upload, clear_message
-from tests.support.msp_bench import waypoint
 from tests.support.world import GroundStation, World
 
 NOTHING_MORE = NavWaypoint().pack(0)[1:]
@@ -115,26 +114,6 @@ def test_a_list_that_does_not_fit_with_the_other_missions_is_refused() -> None:
     assert "more than the 30 that fit with the board's other missions" in bench.text()
     assert bench.stored() == sets(4, 30, 60)
     assert Upload(bench.station, plan(31, 7)).run() is ACCEPTED
-
-
-def test_record_fields_without_an_item_field_survive_a_read_and_a_write() -> None:
-    """From another planner: a user action, a leg that flies home, a landing's ground elevation."""
-    legs = [
-        waypoint(1, p3=0b110),
-        waypoint(2, flag=FLAG_HOME),
-        waypoint(0, lat_e7=0, lon_e7=0, flag=FLAG_HOME),
-        waypoint(3, NavAction.LAND, p2=130, p3=1),
-        waypoint(4, NavAction.RTH, lat_e7=0, lon_e7=0, alt_cm=0, p1=1, flag=FLAG_LAST),
-    ]
-    bench = Bench(9)
-    bench.eeprom[: 5 * WAYPOINT_SIZE] = b"".join(leg.pack(number) for number, leg in enumerate(legs, 1))
-    bench.faults.stick_loads += 1
-    bench.world.run(3)
-    before = bytes(bench.eeprom[: 5 * WAYPOINT_SIZE])
-    items = Download(bench.station).run()
-    assert Upload(bench.station, items).run() is ACCEPTED
-    assert bytes(bench.eeprom[: 5 * WAYPOINT_SIZE]) == before
-    assert bench.world.store.missions[-1][0].verdict.findings == ()
 
 
 def test_clear_clears_the_loaded_mission() -> None:

@@ -1,18 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's safehomes as rally points: up to eight places, without heights, and the approaches by which it lands.
+"""INAV's safehomes, as rally points, and the store that geozones share with them: in RAM until INAV saves.
 
-Each MSP_SET_WP erases an approach: that of the mission whose number is the count of missions written since the boot,
-and after nine missions all of them, also those of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
+The old places stay in its flash until the new places are read back equal. Otherwise the old places are written again.
+A safehome has no height, but an approach by which an aeroplane lands. Each MSP_SET_WP erases an approach: that of the
+mission whose number is the count of missions written since the boot, and after nine missions all of them, also those
+of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
 """
 
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from bridge.controllers.inav.place_store import InavPlaceStore, take
-from bridge.line.conversation import Conversation, ask
-from bridge.missions.list_check import ListCheck, missing_coordinate, refuse_frame, refuse_position
+from bridge.fc.fc_settings import write_eeprom
+from bridge.fc.profile import FlightController
+from bridge.line.conversation import Conversation, LinkLost, ask, ask_armed
+from bridge.missions.fc_mission_store import (
+    FcMissionStore,
+    PushFailure,
+    PushProgress,
+    PushResult,
+    StoreReport,
+    StoreState,
+)
+from bridge.missions.list_check import ListCheck, MissionRules, missing_coordinate, refuse_frame, refuse_position
 from bridge.model.ground_track import distance_m
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.msp.frame import Direction, request
 from protocols.msp.inav_places import (
     APPROACH_SIZE,
     FW_APPROACH,
@@ -29,7 +42,74 @@ from protocols.msp.inav_places import (
     encode_read_safehome,
 )
 from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
-from reports.verdict import CLEARED_LIST, Result, Verdict
+from reports.verdict import CLEARED_LIST, RecordT, Result, Verdict
+
+_ACK_SIZE = 0
+
+
+class InavPlaceStore(FcMissionStore[RecordT]):
+    """Lists that INAV's configuration holds."""
+
+    reads_armed = True
+
+    def __init__(self, controller: FlightController) -> None:
+        assert controller.arm_bit is not None
+        self._arm_bit = controller.arm_bit
+        #: As last read; None if unknown.
+        self._known: tuple[RecordT, ...] | None = None
+        #: True if the board's RAM may differ from the flash.
+        self._is_unsaved = False
+
+    def report(self) -> Conversation[StoreReport | None]:
+        armed = yield from ask_armed(self._arm_bit)
+        if armed is None or (yield from self.pull()) is None:
+            return None
+        return StoreReport(StoreState.ARMED if armed else StoreState.READY, self._rules(), None)
+
+    def push(self, records: tuple[RecordT, ...], progress: PushProgress) -> Conversation[PushResult]:
+        """Write what differs, read all of it back, and save it."""
+        try:
+            before = self._known if self._known is not None else (yield from self.pull())
+            if before is None or (yield from ask_armed(self._arm_bit)) is not False:
+                return PushResult(PushFailure.PLACES_KEPT)
+            wanted = self._whole(records)
+            if before == wanted and not self._is_unsaved:
+                return PushResult(None, unchanged=True)
+            self._is_unsaved = True
+            is_written = yield from self._write(wanted, before)
+            held = yield from self.pull()
+            if not is_written or held != wanted:
+                yield from self._write(before, held or wanted)
+                self._is_unsaved = (yield from self.pull()) != before
+                return PushResult(PushFailure.PLACES_PARTLY if self._is_unsaved else PushFailure.PLACES_KEPT)
+            if (yield from write_eeprom()) is not None:
+                return PushResult(PushFailure.PLACES_NOT_SAVED)
+            self._is_unsaved, self._known = False, wanted
+            return PushResult(None)
+        except LinkLost:
+            return PushResult(PushFailure.PLACES_PARTLY if self._is_unsaved else PushFailure.PLACES_KEPT)
+
+    def seq_of(self, records: Sequence[RecordT], number: int) -> int:
+        return 0
+
+    @abstractmethod
+    def _rules(self) -> MissionRules:
+        """The rules for a new list."""
+
+    def _whole(self, records: tuple[RecordT, ...]) -> tuple[RecordT, ...]:
+        """The list as it is read back. Of an empty one, what clears it."""
+        return records
+
+    @abstractmethod
+    def _write(self, wanted: tuple[RecordT, ...], held: tuple[RecordT, ...]) -> Conversation[bool]:
+        """Set what differs from `held`. Returns False if the board refuses or does not answer."""
+
+
+def take(command: int, payload: bytes, *, tries: int = 3) -> Conversation[bool]:
+    """Send a setter. Returns True if it was acknowledged."""
+    reply = yield from ask(request(command, payload), command, _ACK_SIZE, tries=tries)
+    return reply is not None and reply.direction is Direction.REPLY
+
 
 #: Items as floats are up to 0.9 m off.
 _NOT_MOVED_M = 1.0
@@ -64,14 +144,6 @@ def write_approaches(wanted: Sequence[FwApproach], held: Sequence[FwApproach] = 
         if not is_taken or (yield from read_approaches((new.number,))) != (new,):
             return False
     return True
-
-
-def approach_text(approach: FwApproach) -> str:
-    """An approach with a heading."""
-    level = "sea level" if approach.is_above_sea else "home"
-    heights = f"from {approach.approach_cm / 100:g} m to the ground at {approach.ground_cm / 100:g} m above {level}"
-    headings = " or ".join(map(str, approach.directions()))
-    return f"FW approach {approach.number}: heading {headings}, {heights}"
 
 
 def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
@@ -177,7 +249,7 @@ class RallyCheck(ListCheck):
                 filled[each.number] = moved
                 ahead.remove((moved.lat_e7, moved.lon_e7))
             elif (each.lat_e7 or each.lon_e7) and each.approach and each.approach.directions():
-                lost = f"Safehome {each.number} was deleted or moved, and lost its {approach_text(each.approach)}"
+                lost = f"Safehome {each.number} was deleted or moved, and lost FW approach {each.number}"
                 self._say(lost, News.WARNING)
         for number in range(SAFEHOMES):
             if number not in filled:
