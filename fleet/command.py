@@ -42,23 +42,20 @@ for _command in (push_mission, verify_mission, fleet_settings, fleet_logs, enrol
 
 @fleet.command("list")
 @address_options
-@click.option("--limit", type=click.IntRange(1), help="The maximum number of vehicles.")
 @json_option
-def list_vehicles(as_json: bool, limit: int | None, **where: Any) -> None:
+def list_vehicles(as_json: bool, **where: Any) -> None:
     """Show which vehicles are alive, and their state.
 
     Exit code 0 even if there are none; 1: a vehicle or the router does not answer.
     """
     with fleet_session(where) as (session, prefix), fleet_session(where) as (second, _):
         everyone = roll_call(session, prefix, second)
-    shown, unanswered = everyone[:limit], sum(not vehicle.answers for vehicle in everyone)
+    unanswered = sum(not vehicle.answers for vehicle in everyone)
     if as_json:
         counts = {"alive": len(everyone), "unanswered": unanswered}
-        print_json({"vehicles": [asdict(vehicle) for vehicle in shown], "complaints": complaints(everyone)} | counts)
-    elif shown:
-        click.echo("\n".join(fleet_lines(shown)))
-        if len(shown) < len(everyone):
-            click.echo(f"and {len(everyone) - len(shown):,} more")
+        print_json({"vehicles": [asdict(vehicle) for vehicle in everyone], "complaints": complaints(everyone)} | counts)
+    elif everyone:
+        click.echo("\n".join(fleet_lines(everyone)))
     else:
         click.echo(f"No vehicle is alive under {prefix!r}.")
     for line in () if as_json else complaints(everyone):

@@ -7,7 +7,6 @@ import json
 import time
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -29,8 +28,6 @@ from terminal.sentences import fail, say
 _TIMEOUT_S = 30.0
 #: The limit for a piece. A bridge sends 64 kB.
 _MOST_BYTES = 1 << 20
-#: After a piece without a reply, for example because the link is down.
-_TRIES, _PAUSE_S = 5, 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,20 +64,12 @@ def fetch_log(
         while file.tell() < log.size:
             began_at = time.monotonic()
             request = json.dumps({"name": log.name, "start": file.tell()}).encode()
-            piece, cost = _piece(_again(session, prefix, vehicle, request), file.tell())
+            piece, cost = _piece(_ask(session, prefix, vehicle, LOG_READ, request), file.tell())
             file.write(piece)
             file.flush()
             show(file.tell())
             time.sleep(max(0.0, began_at + cost / rate_b_s - time.monotonic()))
     partial.rename(path)
-
-
-def _again(session: zenoh.Session, prefix: str, vehicle: str, request: bytes) -> Json:
-    for _ in range(_TRIES - 1):
-        with suppress(NoReply):
-            return _ask(session, prefix, vehicle, LOG_READ, request)
-        time.sleep(_PAUSE_S)
-    return _ask(session, prefix, vehicle, LOG_READ, request)
 
 
 def _piece(result: Json, start: int) -> tuple[bytes, int]:
@@ -95,10 +84,6 @@ def _piece(result: Json, start: int) -> tuple[bytes, int]:
     return piece, len(data)
 
 
-class NoReply(FleetError):
-    """The vehicle did not reply."""
-
-
 def _ask(session: zenoh.Session, prefix: str, vehicle: str, key: ZenohKey, payload: bytes | None) -> Json:
     for _, reply in ask_each(session, prefix, [vehicle], key.suffix, _TIMEOUT_S, payload):
         if reply is not None:
@@ -106,7 +91,7 @@ def _ask(session: zenoh.Session, prefix: str, vehicle: str, key: ZenohKey, paylo
             if result is None:
                 raise FleetError(f"{vehicle}: {error}")
             return result
-    raise NoReply(f"{vehicle} {NO_COMMANDS}")
+    raise FleetError(f"{vehicle} {NO_COMMANDS}")
 
 
 @click.command("logs", short_help="List and fetch a vehicle's telemetry logs.")

@@ -49,7 +49,6 @@ _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREA
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=PATH, metavar="FILE...")
-@click.option("--strict", is_flag=True, help="Changed values and dropped items count as rejection (exit code 1).")
 @click.option(
     "--kind",
     type=click.Choice(list(_RULES)),
@@ -76,7 +75,6 @@ _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREA
 def check(
     ctx: click.Context,
     files: Sequence[Path],
-    strict: bool,
     kind: str,
     settings_file: Path | None,
     home: tuple[int, int] | None,
@@ -98,7 +96,7 @@ def check(
         rules = _RULES[kind](RuleSettings(limit_m, saved))
     except ValueError as error:
         raise click.UsageError(Fault.BAD_SAVED_VALUE.text(why=f"{settings_file}: {error}")) from error
-    codes = [_check_file(path, rules, home, strict, as_json) for path in files]
+    codes = [_check_file(path, rules, home, as_json) for path in files]
     ctx.exit(max(codes, key=_RANKS.index))
 
 
@@ -115,7 +113,7 @@ def _saved_settings(path: Path, kind: str) -> SavedSettings:
     return saved._replace(values={names.get(name.upper(), name): value for name, value in saved.values.items()})
 
 
-def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, strict: bool, as_json: bool) -> ExitCode:
+def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, as_json: bool) -> ExitCode:
     name = shown_path(path)
     try:
         sent = with_home(load_mission(path), home)
@@ -130,8 +128,7 @@ def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, s
         print_json({"file": name, **verdict_data(verdict)})
     else:
         _print_verdict(name, sent, verdict)
-    rejected = verdict.result is Result.REJECTED or (strict and bool(without_defaults(verdict.findings)))
-    if rejected:
+    if verdict.result is Result.REJECTED:
         return ExitCode.REJECTED
     return ExitCode.CLEARED if verdict.result is Result.CLEARED else ExitCode.ACCEPTED
 

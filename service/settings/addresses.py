@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Connection strings, in the forms of pymavlink, MAVProxy and MAVSDK."""
 
-import re
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,7 +95,6 @@ _GCS_KINDS = ("udpin", "udpout", "udpbcast", "tcpin")
 _EVERY_ADDRESS = ("", "0.0.0.0", "[::]")  # noqa: S104  # ground stations may come over any network
 _PORT_NAMES = ("tty", "serial", "rfcomm", "naze")
 _MIN_BAUD, _MAX_BAUD = 1200, 4_000_000
-_NEXT_LINK = re.compile(r"[,\s]\s*(?=[A-Za-z]+:|/)")
 
 
 def parse_fc(text: str) -> FcAddress:
@@ -137,11 +135,6 @@ def _parse_serial(text: str, port: str) -> SerialFc:
     if not baud.isdecimal() or not _MIN_BAUD <= int(baud) <= _MAX_BAUD:
         raise AddressError(Fault.NOT_A_BAUD.text(text=repr(text), baud=repr(baud)))
     return SerialFc(path, int(baud))
-
-
-def split_gcs(text: str) -> list[str]:
-    """Split "udpin:14550,tcpin:5760" into the links."""
-    return _NEXT_LINK.split(text)
 
 
 def parse_gcs(text: str) -> GcsAddress:

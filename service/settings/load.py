@@ -8,7 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from service.settings.addresses import GcsAddress, parse_gcs, split_gcs
+from service.settings.addresses import GcsAddress, parse_gcs
 from service.settings.config_files import Given, read_files
 from service.settings.key import Problem, SettingsError, Unfit
 from service.settings.settings import DEFAULT_GCS, Settings
@@ -122,7 +122,7 @@ def _noting(problems: list[Problem], where: str) -> Iterator[None]:
 
 def _named_links(gcs: Sequence[str], problems: list[Problem]) -> list[GcsAddress]:
     links: list[GcsAddress] = []
-    for text in (link for named in gcs for link in split_gcs(named)):
+    for text in gcs:
         with _noting(problems, "--gcs"):
             links.append(parse_gcs(text))
     return links

@@ -91,9 +91,3 @@ def test_a_staged_push_stops_at_an_armed_vehicle(tmp_path: Path) -> None:
         assert "disarm" in pushed["owl"]["error"]
         assert pushed["swift"]["error"] == "owl had failed"
         assert fleet.daemons["swift"].pull()["count"] == 0
-
-
-def test_a_list_ends_at_the_limit(fleet: Fleet) -> None:
-    listed = json.loads(fleet.ask("list", "--json", "--limit", "2").stdout)
-    assert [each["name"] for each in listed["vehicles"]] == ["kite", "owl"]
-    assert fleet.ask("list", "--limit", "2").stdout.endswith("\nand 1 more\n")

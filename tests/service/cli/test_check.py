@@ -68,14 +68,6 @@ def test_the_exit_code_of_several_files_is_the_worst(
     assert run(*mode, *[files[name] for name in names]).exit_code == code
 
 
-def test_strict_treats_changes_as_rejection(files: dict[str, Path]) -> None:
-    assert run("--strict", files["clean"]).exit_code == 0
-    assert run(FIELD).exit_code == 0
-    assert run("--strict", FIELD).exit_code == 1
-    assert run("--strict", files["cleared"]).exit_code == 1
-    assert run("--strict", FIELD, files["damaged"]).exit_code == 2
-
-
 def test_json_has_one_object_per_file_with_the_documented_keys(files: dict[str, Path]) -> None:
     result = run("--json", FIELD, files["rejected"], files["cleared"], files["missing"])
     accepted, rejected, cleared, missing = objects(result)

@@ -14,7 +14,7 @@ from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import serial_link
-from service.settings.addresses import AddressError, parse_gcs, split_gcs
+from service.settings.addresses import AddressError, parse_gcs
 from tests.support.links import Links
 from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
@@ -137,9 +137,6 @@ async def test_an_unplugged_radio_comes_back(
 
 
 def test_a_radio_is_given_by_path_and_speed() -> None:
-    assert [str(parse_gcs(each)) for each in split_gcs("udpin:14550, /dev/ttyUSB1,57600")] == [
-        "udpin:0.0.0.0:14550",
-        "/dev/ttyUSB1,57600",
-    ]
-    with pytest.raises(AddressError, match="add the radio's serial speed, as in /dev/ttyUSB1,57600"):
+    assert str(parse_gcs("/dev/ttyUSB1,57600")) == "/dev/ttyUSB1,57600"
+    with pytest.raises(AddressError, match="lacks the radio's serial speed; add it, as in /dev/ttyUSB1,57600"):
         parse_gcs("/dev/ttyUSB1")

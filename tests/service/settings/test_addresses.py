@@ -3,7 +3,7 @@
 
 import pytest
 
-from service.settings.addresses import AddressError, GcsAddress, parse_fc, parse_gcs, split_gcs
+from service.settings.addresses import AddressError, GcsAddress, parse_fc, parse_gcs
 from service.settings.web import parse_listen
 
 
@@ -94,10 +94,6 @@ def test_ambiguous_connections_are_explained(text: str, words: str) -> None:
 )
 def test_other_programs_notations_of_flight_controllers_are_accepted(text: str, meant: str) -> None:
     assert str(parse_fc(text)) == meant
-
-
-def test_one_value_may_have_several_links() -> None:
-    assert split_gcs("udpin:14550,tcpin:5760 udpout:pc,14551") == ["udpin:14550", "tcpin:5760", "udpout:pc,14551"]
 
 
 def test_ipv6_without_brackets_is_explained() -> None:
