@@ -20,7 +20,7 @@ from fleet.push import FleetPush, push
 from fleet.roll_call import alive, chosen
 from fleet.tables import (
     dry_run_table,
-    push_bars,
+    push_bar,
     push_data,
     push_summary,
     push_table,
@@ -74,7 +74,7 @@ def push_mission(
     not accept it), or did not answer.
     """
     require_choice(names, to_all)
-    mission, item_count = _read(file)
+    mission = _read(file)
     with fleet_session(where) as (session, prefix):
         bridges = alive(session, prefix)
         meant = chosen(bridges, names, prefix)
@@ -87,7 +87,7 @@ def push_mission(
             for trial in try_mission(session, prefix, meant, bridges, mission):
                 if trial.is_held:
                     delivery.held(trial.vehicle, f"Mission held already: {trial.count} records")
-        has_failed = push_file(session, prefix, delivery, mission, item_count, _MISSION, staged=staged, as_json=as_json)
+        has_failed = push_file(session, prefix, delivery, mission, _MISSION, staged=staged, as_json=as_json)
     if has_failed:
         raise SystemExit(1)
 
@@ -103,7 +103,7 @@ def verify_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bo
     Exit code 1: one does not hold it, or did not answer.
     """
     require_choice(names, to_all)
-    mission, _ = _read(file)
+    mission = _read(file)
     with fleet_session(where) as (session, prefix):
         bridges = alive(session, prefix)
         meant = chosen(bridges, names, prefix)
@@ -118,12 +118,13 @@ def verify_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bo
         raise SystemExit(1)
 
 
-def _read(file: Path) -> tuple[bytes, int]:
+def _read(file: Path) -> bytes:
     try:
         mission = read_file(file, MissionFileError)
-        return mission, len(read_mission_file(mission, shown_path(file)))
+        read_mission_file(mission, shown_path(file))
     except MissionFileError as error:
         fail(error, UNREADABLE)
+    return mission
 
 
 def require_choice(names: tuple[str, ...], to_all: bool) -> None:
@@ -136,16 +137,15 @@ def push_file(
     prefix: str,
     delivery: FleetPush,
     file: bytes,
-    count: int,
     what: Pushed,
     *,
     staged: bool,
     as_json: bool,
 ) -> bool:
-    """Push a file with `count` parts and print the outcome. Returns True if a vehicle failed."""
+    """Push a file and print the outcome. Returns True if a vehicle failed."""
     is_stopped = False
     try:
-        with push_bars(count) as show:
+        with push_bar() as show:
             push(session, prefix, delivery, file, show, staged=staged, key=what.key)
     except KeyboardInterrupt:
         is_stopped = True

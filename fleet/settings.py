@@ -180,25 +180,24 @@ def restore_settings(
     could not take them).
     """
     require_choice(names, to_all)
-    data, count = _read(file)
+    data = _read(file)
     with fleet_session(where) as (session, prefix):
         found = chosen(alive(session, prefix), names, prefix)
         if dry_run:
             _show_trials(try_settings(session, prefix, found, data), as_json)
             return
-        has_failed = push_file(
-            session, prefix, FleetPush(found), data, count, _SETTINGS, staged=staged, as_json=as_json
-        )
+        has_failed = push_file(session, prefix, FleetPush(found), data, _SETTINGS, staged=staged, as_json=as_json)
     if has_failed:
         raise SystemExit(1)
 
 
-def _read(file: Path) -> tuple[bytes, int]:
+def _read(file: Path) -> bytes:
     try:
         data = read_file(file, ParamFileError)
-        return data, len(read_param_file(data, shown_path(file)).values)
+        read_param_file(data, shown_path(file))
     except ParamFileError as error:
         fail(error, UNREADABLE)
+    return data
 
 
 def _show_trials(trials: list[SettingsTrial], as_json: bool) -> None:

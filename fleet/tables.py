@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich import box
-from rich.progress import TaskID
 from rich.table import Table
 from rich.text import Text
 
@@ -113,24 +112,15 @@ def _number(value: float | None, form: str, unit: str = "") -> str:
 
 
 @contextmanager
-def push_bars(item_count: int) -> Iterator[Callable[[FleetPush], None]]:
-    """Show the count of finished vehicles and a progress bar per transfer on standard error, if that is a terminal."""
+def push_bar() -> Iterator[Callable[[FleetPush], None]]:
+    """Show the count of finished vehicles as a bar on standard error, if that is a terminal."""
     with progress_bars(console(to_error=True)) as bars:
-        # First, because only the last lines are cut off if there are more than the terminal has.
-        whole_fleet = bars.add_task("")
-        tasks: dict[str, TaskID] = {}
+        task = bars.add_task("")
 
         def show(now: FleetPush) -> None:
             count, failed = len(now.vehicles), len(now.failed)
             title = f"Vehicles, {failed} failed" if failed else "Vehicles"
-            bars.update(whole_fleet, description=title, completed=count - len(now.waiting), total=count)
-            for name in tasks.keys() - now.running:
-                bars.remove_task(tasks.pop(name))
-            for name in now.running:
-                if name not in tasks:
-                    tasks[name] = bars.add_task(name)
-                progress = now.vehicles[name]
-                bars.update(tasks[name], completed=progress.records, total=progress.total or item_count)
+            bars.update(task, description=title, completed=count - len(now.waiting), total=count)
 
         yield show
 

@@ -26,7 +26,7 @@ class Fault(Enum):
     # Mission files
     STRANGE_FILE = "no mission begins with {line}", _MISSION_AS
     OTHER_FILE = "this is {kind}", _MISSION_AS
-    WEB_PAGE = "this is a web page", "download the file itself (on GitHub: Raw)"
+    WEB_PAGE = "this file holds a web page", "download the file itself (on GitHub: Raw)"
     OTHER_PLAN = "this file holds {kinds}", "give the mission's own file"
     SETTINGS_FOR_MISSION = (
         "this file holds settings",
@@ -52,7 +52,6 @@ class Fault(Enum):
     NOT_WHOLE = "{what} is {text}, not a whole number from 0 to {most}", _AGAIN
     OUT_OF_RANGE = "{what} is {text}, out of range", _AGAIN
     NOT_DEGREES = "{what} is {text}", "give it in degrees"
-    UNKNOWN_COMMAND = "command {text} of version 100 is unknown", _AGAIN
     UNKNOWN_ACTION = "its action is {text}", "use one of {actions}"
     NOT_A_WP_LINE = "{line} is not a waypoint", "write wp NUMBER ACTION LAT LON ALT P1 P2 P3 FLAG, as `dump` does"
     MANY_MISSIONS = "the file holds {count} missions", "save one of them as a file of its own"
@@ -106,9 +105,8 @@ class Fault(Enum):
     LINK_OF_ROOT = "{why}", "ports below 1024 need root; choose another port"
     UNKNOWN_HOST = "{why}", "check the name and the network, or give the address in numbers"
     KEY_FILE_OPEN = "key_file {path} is readable by other users", "run chmod 600 {path}"
-    KEY_FILE_BINARY = "key_file {path} holds no text", "write the passphrase into it, on one line"
     KEY_FILE_LINES = (
-        "key_file {path} holds more than a line, or none",
+        "key_file {path} holds no text, or other than one line",
         "write the passphrase into it, on one line, and no more",
     )
     # The machine: naze-bridge doctor
@@ -257,9 +255,10 @@ class Fault(Enum):
     NOT_A_PASSWORD = "this is not a Wi-Fi password", "use 8 to 63 characters: letters, digits, blanks, signs of ASCII"
     NOT_A_COUNTRY = "{text} is not a country code", "use two letters, such as DE"
     NOT_A_HOST_NAME = "{text} is not a host name", "use letters, digits and hyphens, at most 63"
-    SECRET_UNREADABLE = "{path} cannot be read: {why}", "check the path and its permissions"
-    SECRET_BINARY = "{path} is not a text file", "write one line of text into it"
-    SECRET_LINES = "{path} does not hold exactly one line", "write one line of text into it, without blanks around it"
+    SECRET_LINES = (
+        "{path} holds no text, or other than one line",
+        "write one line into it, without blanks around it",
+    )
     SHADOWED_ANSWER = "{file} sets {name}, which overrides the answer to setup", "remove it there to use the answer"
     FAILED_CHANGE = "{why}", "earlier changes are kept: correct this, and run setup again"
     # naze-bridge check

@@ -92,7 +92,7 @@ def _fields_110(fields: list[str], name: str, where: str) -> list[str]:
     ordered = [fields[place] for place in _ORDER_100]
     command = _COMMANDS_100.get(ordered[3])
     if command is None:
-        raise MissionFileError(name, where, *Fault.UNKNOWN_COMMAND(text=shown(ordered[3])))
+        raise MissionFileError(name, where, *Fault.OUT_OF_RANGE(what="the command", text=shown(ordered[3])))
     ordered[3] = str(int(command))
     return ordered
 

@@ -91,7 +91,7 @@ def read_passphrase(path: Path) -> str:
         raise AddressError(f"key_file {path} cannot be read: {reason(error)}") from error
     except UnicodeDecodeError:
         # Not "from" the error, which quotes the passphrase.
-        raise AddressError(Fault.KEY_FILE_BINARY.text(path=path)) from None
+        raise AddressError(Fault.KEY_FILE_LINES.text(path=path)) from None
     passphrase = passphrase.removesuffix("\n").removesuffix("\r")
     if not passphrase or "\n" in passphrase or len(passphrase) > _MAX_PASSPHRASE:
         raise AddressError(Fault.KEY_FILE_LINES.text(path=path))

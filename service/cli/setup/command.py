@@ -141,7 +141,7 @@ def setup(
         show_secret("The key, for ground stations that may make changes", str(answers.key), KEY_FILE, str(answers.key))
     is_well = True
     if any(step.needs_reboot for step in steps):
-        click.echo("\nReboot once for the UART: sudo reboot. After that: naze-bridge doctor")
+        click.echo("\nReboot once for the UART: sudo reboot. After that: sudo naze-bridge doctor")
     elif host.path("/run/systemd/system").exists():
         if steps:
             _await_flight_controller()
@@ -275,9 +275,9 @@ def secret_line(path: Path) -> str:
     try:
         lines = read_bounded(path, 1 << 10).decode().removesuffix("\n").removesuffix("\r").split("\n")
     except OSError as error:
-        raise click.UsageError(Fault.SECRET_UNREADABLE.text(path=path, why=reason(error))) from error
+        raise click.UsageError(Fault.UNREADABLE_FILE.text(why=f"{path} cannot be read: {reason(error)}")) from error
     except UnicodeDecodeError:
-        raise click.UsageError(Fault.SECRET_BINARY.text(path=path)) from None  # the error would quote the secret
+        raise click.UsageError(Fault.SECRET_LINES.text(path=path)) from None  # the error would quote the secret
     if len(lines) != 1 or not lines[0].isprintable() or lines[0].strip() != lines[0] or not lines[0]:
         raise click.UsageError(Fault.SECRET_LINES.text(path=path))
     return lines[0]

@@ -131,7 +131,7 @@ def test_the_passphrase_is_the_line_without_the_end(key_file: Path, content: byt
 @pytest.mark.parametrize("content", [b"", b"\n", b"two\nlines\n", b"x" * 5000])
 def test_a_passphrase_is_one_line_of_text(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
-    with pytest.raises(AddressError, match="holds more than a line, or none"):
+    with pytest.raises(AddressError, match="holds no text, or other than one line"):
         read_passphrase(key_file)
 
 
