@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.missions.list_check import check_list
 from payloads.comparison import checked_mission, sent_and_stored, stored_mission
-from payloads.mission_data import MAX_ITEMS, to_json, verdict_data
+from payloads.mission_data import to_json, verdict_data
 from protocols.mission_item import MissionItem
 from reports.verdict import Result
 
@@ -87,4 +87,4 @@ def test_a_list_of_thousands_is_truncated_with_a_note() -> None:
         "items": long, "stored_items": [], "findings": [], "sent_seqs": [],
     }  # fmt: skip
     shown = stored_mission({"number": 1, "received": received, "outcome": "REJECTED", "detail": ""})
-    assert (len(shown["rows"]), shown["rows_left_out"]) == (MAX_ITEMS, 5000 - MAX_ITEMS)
+    assert (len(shown["rows"]), shown["rows_left_out"]) == (500, 4500)

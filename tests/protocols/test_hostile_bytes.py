@@ -11,9 +11,11 @@ import pytest
 
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.msp.command_line import EchoWatch
-from protocols.msp.frame import MAX_REPLY, MspParser
+from protocols.msp.frame import MspParser
 
 SIZE = 10_000
+#: A block of the data flash, the largest reply of an INAV.
+LARGEST_REPLY = 4112
 #: Above a false header every 7 bytes whose checksum is computed line by line over 256 bytes.
 LINES_PER_BYTE = 60
 #: A header that claims a long frame, or the beginning of something else, repeated.
@@ -25,10 +27,10 @@ PATTERNS = {
     "signed headers": b"\xfd\xff\x01\x00\x00\x01\x01\x01\x00\x00",
     "MSP": b"$",
     "MSP requests": b"$M<\xff\x01",
-    "MSP jumbo replies": b"$M>\xff\x01" + MAX_REPLY.to_bytes(2, "little"),
+    "MSP jumbo replies": b"$M>\xff\x01" + LARGEST_REPLY.to_bytes(2, "little"),
     "MSP v2 requests": b"$X<\x00\x01\x01\xff\x00",
-    "MSP v2 replies": b"$X>\x00\xff\xff" + MAX_REPLY.to_bytes(2, "little"),
-    "MSP v2 errors": b"$X!\x00\xff\xff" + (MAX_REPLY // 2).to_bytes(2, "little"),
+    "MSP v2 replies": b"$X>\x00\xff\xff" + LARGEST_REPLY.to_bytes(2, "little"),
+    "MSP v2 errors": b"$X!\x00\xff\xff" + (LARGEST_REPLY // 2).to_bytes(2, "little"),
     "NMEA": b"$GPGGA,",
     "NMEA with wrong checksums": b"$GPGGA,*00",
     "UBX headers": b"\xb5\x62\x01\x01\xff\x00",

@@ -13,10 +13,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from payloads import keys
-from payloads.mission_data import MAX_ITEMS
 from protocols.mission_file import write_mission_file
 from protocols.msp.frame import request
-from protocols.param_file import MOST_SETTINGS
 from service.daemon.api import DaemonApi
 from service.daemon.telemetry_logs import PIECE, TelemetryLogs
 from service.zenoh_link.answers import CommandQueries
@@ -27,10 +25,10 @@ from tests.support.conversations import waypoints
 from tests.support.doors import Doors, work_of
 from tests.support.work import LOOP_BUDGET
 
-LIST = waypoints(MAX_ITEMS)
+LIST = waypoints(500)
 PLAN = write_mission_file(LIST, "x.plan").encode()
 #: Names that the board has, in the other case, and names that no board has.
-SETTINGS = {f"nav_setting_{number}".upper(): 1.0 for number in range(MOST_SETTINGS)}
+SETTINGS = {f"nav_setting_{number}".upper(): 1.0 for number in range(1500)}
 PARAMS = "".join(f"{name},1\n" for name in SETTINGS).encode()
 LARGEST = 1 << 18
 _ADDED_AT_ONCE = 50

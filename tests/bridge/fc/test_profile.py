@@ -81,18 +81,6 @@ def is_known(world: World) -> bool:
 
 
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_a_board_is_found_again_after_a_power_cut(baud: int) -> None:
-    for seed in range(MOMENTS):
-        world = identifying(baud, seed)
-        world.power_off()
-        world.run(random.Random(seed).random() * 4)
-        world.power_on()
-        world.run(world.naze.options.boot_ms / 1000)
-        world.wait_until(is_known, FOUND_WITHIN_S)
-        assert world.kind is harakiri.PATCHED
-
-
-@pytest.mark.parametrize("baud", ALL_SPEEDS)
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
 def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: TelemetryProtocol) -> None:
     for seed in range(MOMENTS):
@@ -106,14 +94,3 @@ def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: Telem
         world.wait_until(lambda w: w.naze.protocol is not Protocol.MAVLINK, FOUND_WITHIN_S)
         world.run(world.naze.options.tree.value * 10 / baud)
         world.wait_until(lambda w: w.kind is harakiri.PATCHED, FOUND_WITHIN_S)
-
-
-@pytest.mark.parametrize("baud", ALL_SPEEDS)
-def test_a_board_is_found_again_after_a_stall(baud: int) -> None:
-    for seed in range(MOMENTS):
-        world = identifying(baud, seed)
-        world.faults.hang = True
-        world.run(random.Random(seed).random() * 10)
-        world.faults.hang = False
-        world.wait_until(is_known, FOUND_WITHIN_S)
-        assert world.kind is harakiri.PATCHED

@@ -19,7 +19,7 @@ from bridge.settings.local_settings import (
     plan_restore,
 )
 from protocols.msp.frame import MspParser
-from protocols.param_file import MOST_SETTINGS, is_equal
+from protocols.param_file import is_equal
 from simulator.board.options import Faults
 from tests.support.settings_client import BOARDS, ready, restart, value_of
 from tests.support.work import LOOP_BUDGET, work
@@ -152,15 +152,6 @@ def test_an_armed_board_is_not_restored() -> None:
     assert writes(world) == before
 
 
-def test_settings_of_another_firmware_are_refused_without_a_write() -> None:
-    world, _ = ready(BOARDS[NAZE])
-    before = writes(world)
-    result = restored(world, {"p_roll": 44.0}, "INAV 8.0.1")
-    assert isinstance(result, SettingRefusal)
-    assert "INAV 8.0.1" in result.text
-    assert writes(world) == before
-
-
 @pytest.mark.parametrize("name", ["patched Harakiri", "INAV"])
 def test_a_file_with_the_names_of_parameters_is_restored(name: str) -> None:
     world, client = ready(BOARDS[name])
@@ -240,12 +231,6 @@ def plan(wanted: dict[str, Value], source: str = BOARD, table: SettingTable = TA
     return found
 
 
-def test_only_differences_are_written() -> None:
-    found = plan({"p_roll": 40.0, "cf": 0.1, "name": "kite"})
-    assert found.changes == (PlannedChange("p_roll", 35, 40.0),)
-    assert (found.left_out, found.notice) == ((), "")
-
-
 @pytest.mark.parametrize(
     ("name", "value", "why"),
     [
@@ -277,11 +262,6 @@ def test_the_pids_of_a_betaflight_dump() -> None:
 
 def test_a_setting_that_can_only_be_lowered_is_lowered() -> None:
     assert plan({"esc_moff": 999.0}).changes == (PlannedChange("esc_moff", 1000, 999.0),)
-
-
-def test_a_name_that_the_board_lacks_is_left_out() -> None:
-    found = plan({"p_roll": 35.0, "SYSID_THISMAV": 1.0})
-    assert found.left_out == (LeftOut("SYSID_THISMAV", 1.0, None, "the board has no such setting"),)
 
 
 def test_a_text_that_looks_like_a_number_is_restored_as_a_text() -> None:
@@ -322,5 +302,5 @@ def test_every_setting_is_written_left_out_or_equal(wanted: dict[str, Value]) ->
 
 def test_the_longest_file_is_compared_with_the_largest_board_within_the_loops_budget() -> None:
     table = table_of(*(BoardSetting(f"nav_setting_{n}", INTEGER, 0, 200, 35) for n in range(1000)))
-    wanted: dict[str, Value] = {f"NAV_SETTING_{n}": 5.0 for n in range(MOST_SETTINGS)}
+    wanted: dict[str, Value] = {f"NAV_SETTING_{n}": 5.0 for n in range(1500)}
     assert work(lambda: plan(by_setting(wanted, table.settings), table=table)) < LOOP_BUDGET

@@ -7,7 +7,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from protocols.msp.frame import MAX_REPLY, Direction, MspFrame, request
+from protocols.msp.frame import Direction, MspFrame, request
 from protocols.msp.nav import LAST, NavAction, NavRecord
 from simulator.commands.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav
@@ -15,6 +15,8 @@ from tests.support.share_program import ShareProgram
 from tests.support.world import GroundStation, World
 
 DATAFLASH_READ, BOXNAMES, WP, SERVO_MIXER = 71, 116, 118, 0x2020
+#: A block of the data flash, the largest reply of an INAV.
+LARGEST_REPLY = 4112
 SAFEHOME, SET_SAFEHOME, SETTING_INFO = 0x2038, 0x2039, 0x1007
 SET_PID, SET_WP, SET_MOTOR, EEPROM_WRITE = 202, 209, 214, 250
 PAYLOADS = {DATAFLASH_READ: bytes(6)}
@@ -27,7 +29,7 @@ def ready(board: FakeInav, *, may_write: bool = False, over_udp: bool = False) -
     return world, ShareProgram(world, may_write=may_write, over_udp=over_udp)
 
 
-@pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 500), (DATAFLASH_READ, MAX_REPLY)])
+@pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 500), (DATAFLASH_READ, LARGEST_REPLY)])
 def test_a_long_reply_is_forwarded_and_the_link_continues(command: int, size: int) -> None:
     board = FakeInav()
     board.answers = {**board.answers, command: bytes(size)}
@@ -47,7 +49,7 @@ def test_a_lost_reply_does_not_lose_the_link(command: int, is_damaged: bool) -> 
     for _ in range(4):
         if is_damaged:
             world.run(0.1)
-            world.receive_from_fc(MspFrame(Direction.REPLY, command, bytes(MAX_REPLY)).encode()[:-1] + b"\xff")
+            world.receive_from_fc(MspFrame(Direction.REPLY, command, bytes(LARGEST_REPLY)).encode()[:-1] + b"\xff")
         world.run(0.9)
     assert world.events("fc.lost") == []
     assert program.closed_at is not None

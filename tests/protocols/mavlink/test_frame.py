@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVLink frames are found in any stream: byte by byte, after false or truncated headers, in bounded time."""
 
-import random
 from itertools import pairwise
 
 from hypothesis import example, given
@@ -11,8 +10,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from tests.support.packing import pack
-
-MEGABYTE = 1 << 20
 
 
 def make_frames() -> list[bytes]:
@@ -66,23 +63,6 @@ def test_a_stream_gives_the_same_frames_however_it_is_split(data: bytes, cuts: l
     assert splitter.skipped_bytes + sum(len(frame.raw) for frame in whole + rest) == len(data)
 
 
-@given(streams, st.sampled_from(FRAMES), streams)
-def test_a_frame_behind_garbage_is_lost_only_if_a_valid_frame_covers_it(
-    before: bytes, frame: bytes, after: bytes
-) -> None:
-    data = before + frame + after
-    found, splitter = split(data, [])
-    found += splitter.feed(b"", is_end=True)
-    assert b"".join(one.raw for one in found).find(frame) >= 0
-
-
-@given(streams)
-def test_found_frames_decode_or_are_refused(data: bytes) -> None:
-    found, splitter = split(data, [])
-    for frame in found + splitter.feed(b"", is_end=True):
-        decode(frame)
-
-
 @given(st.binary(max_size=300))
 def test_any_payload_with_a_valid_checksum_decodes_or_is_refused(payload: bytes) -> None:
     """A known message may have any payload: too long, too short, invalid strings."""
@@ -107,25 +87,3 @@ def test_a_signed_frame_includes_the_signature() -> None:
     (found,) = splitter.feed(frame + FRAMES[0])[:1]
     assert found.raw == frame
     assert splitter.skipped_bytes == 0
-
-
-def test_an_unknown_incompatibility_flag_is_refused() -> None:
-    frame = bytearray(FRAMES[1])
-    assert frame[0] == 0xFD
-    frame[2] = 0x02
-    splitter = MavlinkSplitter()
-    assert splitter.feed(bytes(frame)) + splitter.feed(b"", is_end=True) == []
-
-
-def test_a_megabyte_of_any_bytes_takes_bounded_work() -> None:
-    """At most one frame's bytes are buffered, so each byte is examined only a few times."""
-    draw = random.Random(1)
-    alphabets = (bytes(range(256)), b"\xfe", b"\xfd\x00", b"\xfe\xff\x00", bytes(range(256)) + b"\xfe\xfd" * 128)
-    for alphabet in alphabets:
-        data = bytes(draw.choices(alphabet, k=MEGABYTE // 4))
-        splitter = MavlinkSplitter()
-        for start in range(0, len(data), 4096):
-            splitter.feed(data[start : start + 4096])
-            assert len(splitter._buffer) < 10 + 255 + 2 + 13
-        splitter.feed(b"", is_end=True)
-        assert splitter._buffer == b""

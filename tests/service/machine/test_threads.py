@@ -7,7 +7,7 @@ import threading
 import pytest
 from structlog.testing import capture_logs
 
-from service.machine.threads import MAX_WAITING, BackgroundThread
+from service.machine.threads import BackgroundThread
 
 
 def test_work_is_done_in_order_before_the_end() -> None:
@@ -50,10 +50,10 @@ async def test_a_cancelled_question_does_not_end_the_thread() -> None:
 async def test_questions_to_a_hung_disk_end_in_time_and_do_not_pile_up() -> None:
     hangs = threading.Event()
     thread = BackgroundThread("test", ask_timeout_s=0.001)
-    for _ in range(2 * MAX_WAITING):
+    for _ in range(200):
         with pytest.raises(TimeoutError, match="the disk does not answer"):
             await thread.ask(hangs.wait)
-    assert thread._work.qsize() == MAX_WAITING
+    assert thread._work.qsize() == 100
     hangs.set()
     assert thread.close(timeout_s=10)
 

@@ -15,7 +15,6 @@ from payloads.mission_data import Json
 from protocols.mission_item import MissionItem
 from service.daemon.api import DaemonApi
 from service.web import sent_files
-from service.web.access import MAX_FILE
 from service.web.sent_files import MissionWriter, Progress, SentFiles
 from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import TIMEOUT_S
@@ -71,7 +70,7 @@ def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:
         (b"QGC WPL 110\n", BINARY, 422),
         (b"[" * 100_000, BINARY, 422),
         (b"QGC WPL 110\n" + b"0\t1\t0\t16\t0\t0\t0\t0\t45.1\t8.1\t1\t1\n" * 501, BINARY, 422),
-        (bytes(MAX_FILE + 1), BINARY, 413),
+        (bytes((256 << 10) + 1), BINARY, 413),
         (EXAMPLE.read_bytes(), "text/plain", 415),  # as another site's page could send it
     ],
 )

@@ -13,7 +13,6 @@ from bridge.effects import SendToBoard
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams, Peer
 from protocols.mavlink.codec import FrameWriter, Packed
-from protocols.mavlink.frame import MavlinkSplitter
 from simulator.naze.board import SimulatedNaze
 from tests.support.fake_controllers import QuietLine
 from tests.support.world import GroundStation, World
@@ -213,34 +212,6 @@ def test_signing_keys_are_never_forwarded() -> None:
     assert one.messages("SETUP_SIGNING") == other.messages("SETUP_SIGNING") == []
 
 
-def test_damaged_frames_are_dropped_and_intact_frames_kept() -> None:
-    world, autopilot, (station, _) = passing()
-    chance = random.Random(3)
-    intact = []
-    for message in telemetry(2, 400):
-        frame = autopilot.pack(message)
-        if chance.random() < 0.2:
-            damaged = bytearray(frame)
-            kind = chance.randrange(3)
-            if kind == 0:
-                damaged[chance.randrange(1, len(damaged))] ^= 1 << chance.randrange(8)
-            elif kind == 1:
-                del damaged[chance.randrange(len(damaged))]
-            else:
-                damaged[:0] = b"\xfd\xff\x00\x00"
-            autopilot.outgoing += bytes(damaged)
-            if kind == 2:
-                intact.append(frame)
-        else:
-            autopilot.outgoing += frame
-            intact.append(frame)
-        world.run(0.01)
-    world.run(0.3)
-    passed = [frame for frame in station.frames if frame[7:10] != b"\0\0\0"]
-    assert set(passed) <= set(intact)
-    assert len(intact) - len(passed) <= 2
-
-
 def test_after_an_autopilot_is_unplugged_the_bridge_represents_its_own_vehicle() -> None:
     world, autopilot, (station, _) = passing()
     world.unplug()
@@ -269,13 +240,6 @@ def test_a_board_in_the_command_line_in_place_of_an_autopilot_is_reported() -> N
     world.naze.receive(b"\r\r\r", world.now)
     world.plug()
     world.wait_until(lambda w: any("type exit" in text for text in station.texts()), 20)
-
-
-def test_frames_are_split_as_in_pymavlink() -> None:
-    """The tests above compare only whole frames."""
-    _, autopilot, _ = passing()
-    frames = [autopilot.pack(message) for message in telemetry(5, 10)]
-    assert [frame.raw for frame in MavlinkSplitter().feed(b"".join(frames))] == frames
 
 
 def test_a_false_header_in_a_slow_stream_does_not_delay_a_frame() -> None:
