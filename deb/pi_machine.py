@@ -9,6 +9,7 @@ import os
 import re
 import select
 import shutil
+import signal
 import socket
 import struct
 import subprocess
@@ -16,7 +17,8 @@ import termios
 import threading
 import time
 import tty
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,15 +29,18 @@ CACHE = Path.home() / ".cache" / "naze-bridge-pi-trial"
 _PACKAGES = (
     *("systemd", "systemd-sysv", "systemd-timesyncd", "dbus", "udev", "kmod", "iproute2", "procps", "initramfs-tools"),
     *("zstd", "python3", "openssh-client", "openssh-server", "network-manager", "libpam-systemd"),
+    *("wpasupplicant", "dnsmasq-base", "iw", "udhcpc"),
 )
+NEWER = "99.0"
 _MIB = 1 << 20
 #: A card's size must be a power of two for QEMU. FAT, then ext4, as on a card of Raspberry Pi OS.
 _SIZE, _FAT_AT, _FAT_SIZE = 2048 * _MIB, _MIB, 128 * _MIB
 _EXT4_AT = _FAT_AT + _FAT_SIZE
 _PL011, _MINI_UART = "/soc/serial@7e201000", "/soc/serial@7e215040"
-_BOOT_FILES = {
-    "config.txt": "[all]\nenable_uart=1\ndtoverlay=disable-bt\n",
-    "cmdline.txt": "console=tty1 root=/dev/mmcblk0p2 rootfstype=ext4 fsck.repair=yes rootwait\n",
+#: As Raspberry Pi Imager leaves them.
+BOOT_FILES = {
+    "config.txt": "[all]\n",
+    "cmdline.txt": "console=serial0,115200 console=tty1 root=/dev/mmcblk0p2 rootfstype=ext4 fsck.repair=yes rootwait\n",
     "kernel8.img": "",
 }
 #: Makes the bare Debian a Pi: the modules of its devices, and the names of the UARTs (raspberrypi-sys-mods).
@@ -48,9 +53,12 @@ mkdir -p /boot/firmware /var/log/journal
 sed -i 's/^MODULES=.*/MODULES=list/' /etc/initramfs-tools/initramfs.conf
 printf '%s\n' bcm2835 sdhci_iproc mmc_block ext4 crc32c_generic >>/etc/initramfs-tools/modules
 apt-get install --yes --no-install-recommends linux-image-arm64
-printf '%s\n' bcm2835_wdt dwc2 >/etc/modules-load.d/pi.conf
+printf '%s\n' bcm2835_wdt dwc2 mac80211_hwsim >/etc/modules-load.d/pi.conf
 # QEMU has no chips for these drivers, and emulates slowly.
 printf 'blacklist %s\n' vc4 hci_uart brcmfmac snd_bcm2835 bcm2835_v4l2 >/etc/modprobe.d/pi.conf
+# The Pi's Wi-Fi is wlan0, a phone's wlan1.
+echo 'options mac80211_hwsim radios=2' >>/etc/modprobe.d/pi.conf
+printf '[keyfile]\nunmanaged-devices=interface-name:wlan1\n' >/etc/NetworkManager/conf.d/phone.conf
 printf 'UsePAM no\nUseDNS no\n' >/etc/ssh/sshd_config.d/pi.conf
 cat >/usr/lib/udev/pi-serial <<'NAME'
 #!/bin/sh
@@ -83,9 +91,9 @@ def run(*command: str | Path, **options: object) -> str:
     return str(done.stdout)
 
 
-def make_card(image: Path) -> None:
-    """Write a card with Debian and this project's package. The Debian is made once, and kept in CACHE."""
-    bare = CACHE / "bare"
+def make_roots() -> None:
+    """Make the folders of a bare Debian for the Pi, once, and of a copy with this project's package."""
+    bare, ready = CACHE / "bare", CACHE / "ready"
     run(PROJECT / "deb" / "bare", "bookworm", bare, ",".join(_PACKAGES), "arm64")
     if not (bare / "boot" / "firmware").exists():
         key = CACHE / "key"
@@ -94,12 +102,25 @@ def make_card(image: Path) -> None:
         (bare / "root" / ".ssh").mkdir(exist_ok=True)
         shutil.copy(key.with_suffix(".pub"), bare / "root" / ".ssh" / "authorized_keys")
         _inside(bare, _FURNISH)
+    shutil.rmtree(ready, ignore_errors=True)
+    run("cp", "-a", bare, ready)
     with TemporaryDirectory(dir=CACHE) as folder:
-        root = Path(folder, "root")
-        run("cp", "-a", bare, root)
-        shutil.copy(build("arm64", ("3.11",), Path(folder), compression="none"), root / "root" / "naze-bridge.deb")
-        _inside(root, _INSTALL)
-        _write_card(image, root)
+        package = build("arm64", ("3.11",), Path(folder), compression="none").rename(CACHE / "naze-bridge.deb")
+    shutil.copy(package, ready / "root" / "naze-bridge.deb")
+    _inside(ready, _INSTALL)
+    _repack(package, ready / "root" / "newer.deb")
+
+
+def _repack(package: Path, newer: Path) -> None:
+    """Pack the package again with a higher version, which differs in many modules."""
+    with TemporaryDirectory(dir=CACHE) as folder:
+        tree = Path(folder, "tree")
+        run("dpkg-deb", "--raw-extract", package, tree)
+        control = tree / "DEBIAN" / "control"
+        control.write_text(re.sub("^Version: .*", f"Version: {NEWER}", control.read_text(), flags=re.MULTILINE))
+        for module in tree.glob("usr/lib/naze-bridge/**/service/**/*.py"):
+            module.write_text(f"{module.read_text()}# {NEWER}\n")
+        run("dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, newer)
 
 
 def _inside(root: Path, script: str) -> None:
@@ -107,21 +128,55 @@ def _inside(root: Path, script: str) -> None:
     run("chroot", root, "sh", "-eu", "-c", script, env={"PATH": os.defpath + ":/usr/sbin:/sbin", "LC_ALL": "C"})
 
 
-def _write_card(image: Path, root: Path) -> None:
-    image.unlink(missing_ok=True)
-    with image.open("wb") as file:
-        file.truncate(_SIZE)
-        file.seek(440)
-        file.write(struct.pack("<IH", 0x6E617A65, 0))
-        for kind, at, size in ((0x0C, _FAT_AT, _FAT_SIZE), (0x83, _EXT4_AT, _SIZE - _EXT4_AT)):
-            file.write(struct.pack("<B3xB3xII", 0, kind, at // 512, size // 512))
-        file.seek(510)
-        file.write(b"\x55\xaa")
-    run("mkfs.vfat", "-F", "32", "-s", "1", "--offset", str(_FAT_AT // 512), image, str(_FAT_SIZE // 1024))
-    for name, text in _BOOT_FILES.items():
-        subprocess.run(("mcopy", "-o", "-i", f"{image}@@{_FAT_AT}", "-", f"::/{name}"), input=text.encode(), check=True)
-    place = f"offset={_EXT4_AT}"
-    run("mke2fs", "-q", "-F", "-t", "ext4", "-d", root, "-E", place, image, f"{(_SIZE - _EXT4_AT) // 1024}k")
+class Card:
+    """An SD card's image: FAT, then ext4."""
+
+    def __init__(self, image: Path) -> None:
+        self.image = image
+
+    @classmethod
+    def written(cls, image: Path, root: Path, boot_files: Mapping[str, str]) -> "Card":
+        """Write a root's files and those of the boot partition."""
+        image.unlink(missing_ok=True)
+        with image.open("wb") as file:
+            file.truncate(_SIZE)
+            file.seek(440)
+            file.write(struct.pack("<IH", 0x6E617A65, 0))
+            for kind, at, size in ((0x0C, _FAT_AT, _FAT_SIZE), (0x83, _EXT4_AT, _SIZE - _EXT4_AT)):
+                file.write(struct.pack("<B3xB3xII", 0, kind, at // 512, size // 512))
+            file.seek(510)
+            file.write(b"\x55\xaa")
+        run("mkfs.vfat", "-F", "32", "-s", "1", "--offset", str(_FAT_AT // 512), image, str(_FAT_SIZE // 1024))
+        card = cls(image)
+        for name, text in boot_files.items():
+            subprocess.run(("mcopy", "-o", "-i", card.fat, "-", f"::/{name}"), input=text.encode(), check=True)
+        place = f"offset={_EXT4_AT}"
+        run("mke2fs", "-q", "-F", "-t", "ext4", "-d", root, "-E", place, image, f"{(_SIZE - _EXT4_AT) // 1024}k")
+        return card
+
+    @property
+    def fat(self) -> str:
+        """The boot partition, for mtools."""
+        return f"{self.image}@@{_FAT_AT}"
+
+    def read(self, name: str) -> str:
+        """A file of the boot partition; empty if there is none."""
+        command = ("mtype", "-i", self.fat, f"::/{name}")
+        return subprocess.run(command, capture_output=True, check=False).stdout.decode()
+
+    @contextmanager
+    def mounted(self) -> Iterator[Path]:
+        """The files of the ext4, as a Pi finds them at its next start: the kernel replays the journal.
+
+        TrialError if the file system then has a fault.
+        """
+        with TemporaryDirectory() as folder:
+            run("mount", "-o", f"loop,offset={_EXT4_AT}", self.image, folder)
+            try:
+                yield Path(folder)
+            finally:
+                run("umount", folder)
+        run("e2fsck", "-fn", f"{self.image}?offset={_EXT4_AT}")
 
 
 class _Wire(threading.Thread):
@@ -163,26 +218,40 @@ class _Wire(threading.Thread):
 
 
 class Pi:
-    """A Pi with a card. `folder` has its files; `board` is the terminal of the flight controller on its header.
+    """A Pi. `folder` has its files; `board` is the terminal of the flight controller on its header.
 
-    `speeds`: those that the Pi has set on the header's UART since it was plugged in.
+    `speeds`: those that the Pi has set on the header's UART since it was plugged in. The mini-UART's are not known.
     """
 
-    def __init__(self, card: Path, folder: Path, board: Path) -> None:
-        self._card, self._folder, self._board = card, folder, board
+    def __init__(self, folder: Path, board: Path) -> None:
+        self._folder, self._board = folder, board
         self._qemu: subprocess.Popen[bytes] | None = None
+        self._card: Card
         self.ports = {"ssh": 0, "gcs": 0, "page": 0}
         self.speeds: list[int] = []
         files = CACHE / "bare"
         self._kernel, self._initrd = next(files.glob("boot/vmlinuz-*")), next(files.glob("boot/initrd.img-*"))
-        self._tree = folder / "pi.dtb"
-        shutil.copy(next(files.glob("usr/lib/linux-image-*/broadcom/bcm2837-rpi-3-b.dtb")), self._tree)
-        run("fdtput", "-t", "s", self._tree, "/aliases", "serial0", _PL011)
-        run("fdtput", "-t", "s", self._tree, "/aliases", "serial1", _MINI_UART)
-        run("fdtput", "-r", self._tree, f"{_PL011}/bluetooth")
+        self._dtb = next(files.glob("usr/lib/linux-image-*/broadcom/bcm2837-rpi-3-b.dtb"))
 
-    def start(self) -> None:
+    def _load(self, card: Card) -> tuple[Path, str, bool]:
+        """What a boot loader reads from the card: the device tree, the kernel's words, and who has the header."""
+        config = re.findall(r"^[^#\[\s].*", card.read("config.txt"), re.MULTILINE)
+        is_mini = "dtoverlay=disable-bt" not in config
+        tree = self._folder / "pi.dtb"
+        shutil.copy(self._dtb, tree)
+        for alias, uart in zip(("serial0", "serial1"), sorted((_PL011, _MINI_UART), reverse=is_mini), strict=True):
+            run("fdtput", "-t", "s", tree, "/aliases", alias, uart)
+        if not is_mini:
+            run("fdtput", "-r", tree, f"{_PL011}/bluetooth")
+        elif "enable_uart=1" not in config:
+            run("fdtput", "-t", "s", tree, _MINI_UART, "status", "disabled")
+        words = card.read("cmdline.txt").strip().replace("serial0", "ttyS1" if is_mini else "ttyAMA0")
+        return tree, words, is_mini
+
+    def start(self, card: Card) -> None:
         """Plug the Pi in, and wait until it answers over its network."""
+        self._card = card
+        tree, words, is_mini = self._load(card)
         pins, trace = self._folder / "header", self._folder / "trace"
         trace.write_bytes(b"")
         for path in (pins, self._folder / "ssh"):
@@ -190,16 +259,18 @@ class Pi:
         self.ports = {name: _free_port() for name in self.ports}
         forwarded = (("tcp", "ssh", 22), ("udp", "gcs", 14550), ("tcp", "page", 8080))
         net = ",".join(f"hostfwd={kind}:127.0.0.1:{self.ports[name]}-:{port}" for kind, name, port in forwarded)
+        serials = ("chardev:header", f"file:{self._folder}/other-uart")
         log = (self._folder / "qemu.log").open("ab")
         self._qemu = subprocess.Popen(
             [
                 *("qemu-system-aarch64", "-M", "raspi3b", "-display", "none", "-no-reboot", "-monitor", "none"),
                 # The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
                 *("-icount", "shift=1"),
-                *("-kernel", self._kernel, "-initrd", self._initrd, "-dtb", self._tree),
-                *("-append", _BOOT_FILES["cmdline.txt"].strip()),
-                *("-drive", f"if=sd,format=raw,file={self._card}"),
-                *("-chardev", f"socket,id=header,path={pins},server=on,wait=off", "-serial", "chardev:header"),
+                *("-kernel", self._kernel, "-initrd", self._initrd, "-dtb", tree, "-append", words),
+                *("-drive", f"if=sd,format=raw,file={card.image}"),
+                *("-chardev", f"socket,id=header,path={pins},server=on,wait=off"),
+                # The PL011, and the mini-UART.
+                *(word for each in (serials[::-1] if is_mini else serials) for word in ("-serial", each)),
                 *("-device", "usb-net,netdev=n0", "-netdev", f"user,id=n0,{net}"),
                 # An FTDI adapter.
                 *("-chardev", "null,id=usb", "-device", "usb-serial,chardev=usb,always-plugged=on"),
@@ -208,7 +279,10 @@ class Pi:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
+            start_new_session=True,
         )
+        with suppress(OSError):  # of Linux's automatic groups of processes, where `nice` has no effect between sessions
+            Path(f"/proc/{self._qemu.pid}/autogroup").write_text("10")
         while not pins.exists():
             if self._qemu.poll() is not None:
                 raise TrialError(f"QEMU did not start: see {log.name}")
@@ -236,6 +310,15 @@ class Pi:
                 if time.monotonic() > end:
                     raise TrialError(f"still after {seconds:.0f} s: {error}") from None
             time.sleep(1)
+
+    def copy_card(self, copy: Path) -> None:
+        """Copy the card as it would be if the plug were pulled now: QEMU stops for that long, and writes no sector."""
+        assert self._qemu is not None
+        self._qemu.send_signal(signal.SIGSTOP)
+        try:
+            run("cp", "--sparse=always", self._card.image, copy)
+        finally:
+            self._qemu.send_signal(signal.SIGCONT)
 
     def cut(self) -> None:
         """Pull the plug."""

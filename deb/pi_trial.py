@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`make pi-trial`: the package on a whole emulated Raspberry Pi 3, with systemd, a real device tree and its UART.
+"""`make pi-trial`: the package on a whole emulated Raspberry Pi 3, with systemd, a real device tree and its UARTs.
 
-    python -m deb.pi_trial [--cuts 100] [--keep]
+    python -m deb.pi_trial [--pulls 100] [--boots 10] [PART ...]
 
 The board on the header's pins is the simulated Naze with the patch's compiled core, at the speed that the Pi sets; the
 ground station is pymavlink, outside. The Pi is far slower than a real one, so nothing here measures time.
 
-What QEMU cannot show: the ACT LED, radio (Wi-Fi chips, phones, Bluetooth), a real UART's timing, levels and noise, a
-card that tears or forgets writes, undervoltage, heat, and the boot loader (deb/pi_machine.py plays it).
+A pull of the plug is a copy of the card, taken while QEMU is stopped at a random moment. QEMU writes a sector when the
+Pi does and keeps none back, so the copy is what killing QEMU at that moment leaves: all that was in the Pi's memory is
+lost (the page cache, what the journal and SQLite have not written yet). The copy is examined here: journal replay, a
+check of the file system, the mission store, the settings and dpkg, against what the Pi had acknowledged before the
+moment. Some copies are then started. So one boot is enough for a hundred pulls.
+
+What QEMU cannot show: a card that confirms writes and loses, reorders or tears them, or wears out; radio (Wi-Fi chips,
+phones: mac80211_hwsim plays both; Bluetooth); the ACT LED, a real UART's timing, levels and noise, undervoltage, heat,
+and the boot loader (deb/pi_machine.py plays it).
 """
 
 import argparse
@@ -16,21 +23,28 @@ import os
 import random
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import time
+import tomllib
 import urllib.request
+from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from http.client import HTTPException
+from itertools import count
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
-from deb.pi_machine import CACHE, PROJECT, Pi, TrialError, make_card, run
+from deb.pi_machine import BOOT_FILES, CACHE, NEWER, PROJECT, Card, Pi, TrialError, make_roots, run
+from payloads.mission_data import mission_items
 from protocols.mission_item import MissionItem, MissionResult
 from service.cli.demo import ClientError, MissionClient, connect
+from storage.mission_store import VERIFIED, open_store
 from terminal.files import load_mission
 
 #: Debian's packages, and a program or file of each. The last is there once the kernel runs arm64's programs with it.
@@ -43,8 +57,15 @@ _NEEDED = {
     "device-tree-compiler": "fdtput",
     "qemu-user-static": "/proc/sys/fs/binfmt_misc/qemu-aarch64",
 }
+_PROGRAM = Path(sys.executable).parent / "naze-bridge"
 _MISSION = PROJECT / "examples" / "naze-field.waypoints"
 _HAS_BOARD = "naze-bridge status | grep -q ' MSP'"
+_SSID, _PASSWORD = "kite", "long-enough"
+_SETUP = f"naze-bridge setup --yes --keep-hotspot --hotspot {_SSID} --password-file /root/password --country DE"
+_HAS_HOTSPOT = "nmcli --get-values GENERAL.STATE connection show naze-bridge-hotspot | grep activated"
+_FIRST_MARK = 31.0
+#: Of the pilot's acts, every tenth is a save, which restarts the bridge.
+_SAVED = 10
 
 
 def say(text: str) -> None:
@@ -62,9 +83,9 @@ class Naze:
 
     def __init__(self, folder: Path) -> None:
         self.link, self._control = folder / "naze", folder / "control"
-        program, core = Path(sys.executable).parent / "naze-bridge", PROJECT / "firmware/build/libnaze_mission.so"
+        core = PROJECT / "firmware/build/libnaze_mission.so"
         words = ("sim", "--core", core, "--tele-prot", "3", "--link", self.link, "--control", self._control)
-        self._process = subprocess.Popen([program, *words, "--state", folder / "flash"], stdout=subprocess.DEVNULL)
+        self._process = subprocess.Popen([_PROGRAM, *words, "--state", folder / "flash"], stdout=subprocess.DEVNULL)
         while not self._control.exists():
             check(self._process.poll() is None, "the simulated board did not start")
             time.sleep(0.1)
@@ -85,7 +106,7 @@ def station(pi: Pi) -> AbstractContextManager[MissionClient]:
     return connect("127.0.0.1", pi.ports["gcs"], 900)
 
 
-def mission(mark: int) -> list[MissionItem]:
+def mission(mark: float) -> list[MissionItem]:
     """The example, recognisable by the altitude of its first waypoint."""
     return [replace(item, alt_m=mark) if item.seq == 2 else item for item in load_mission(_MISSION)]
 
@@ -96,7 +117,9 @@ def mark_of(items: list[MissionItem]) -> float:
 
 def boots(pi: Pi, _naze: Naze) -> None:
     """It boots as a Pi 3, the hardened unit is ready, udev names a flight controller on USB and the header."""
-    pi.start()
+    pl011 = {"config.txt": "[all]\nenable_uart=1\ndtoverlay=disable-bt\n"}
+    words = BOOT_FILES["cmdline.txt"].replace("console=serial0,115200 ", "")
+    pi.start(Card.written(CACHE / "work" / "pi.img", CACHE / "ready", BOOT_FILES | pl011 | {"cmdline.txt": words}))
     check("Raspberry Pi 3 Model B" in pi.run("cat /proc/device-tree/model"), "the device tree is not a Pi 3's")
     pi.until("systemctl is-active naze-bridge")
     status = pi.run("cat /proc/$(systemctl show --property MainPID --value naze-bridge)/status")
@@ -121,8 +144,8 @@ def is_examined(pi: Pi, _naze: Naze) -> None:
 def writes(pi: Pi, naze: Naze) -> None:
     """An upload is verified on the board, read back from it, and stored."""
     with station(pi) as gcs:
-        check(gcs.write(mission(31), lambda _: None) is MissionResult.ACCEPTED, f"not accepted: {gcs.texts}")
-        check(mark_of(gcs.read()) == 31, "another mission was read back")
+        check(gcs.write(mission(_FIRST_MARK), lambda _: None) is MissionResult.ACCEPTED, f"not accepted: {gcs.texts}")
+        check(mark_of(gcs.read()) == _FIRST_MARK, "another mission was read back")
     check("VERIFIED" in pi.run("su pilot -c 'naze-bridge missions list'"), "the stored mission is not verified")
     check(json.loads(naze.control("stats"))["records"], "the board stored nothing")
 
@@ -136,55 +159,187 @@ def arms(pi: Pi, naze: Naze) -> None:
     pi.until(_HAS_BOARD)
     check(pi.speeds[-1] == 115200, f"the Pi's UART is at {pi.speeds[-5:]} baud")
     with station(pi) as gcs:
-        check(mark_of(gcs.read()) == 31, "the mission is lost after the flight")
+        check(mark_of(gcs.read()) == _FIRST_MARK, "the mission is lost after the flight")
 
 
-def survives(pi: Pi, cuts: int, seed: int) -> None:
-    """The plug is pulled during and after uploads, and after saves of settings: it boots, with all acknowledged."""
-    chance = random.Random(seed)
-    marks, sysid, lasted = [31.0], 0, {upload: 20.0, save: 20.0}
-    for turn in range(cuts):
-        act, mark, is_during = (upload, save)[turn % 2], 40 + turn % 200, turn % 4 == 2
-        acknowledged = Event()
-        work = Thread(target=act, args=(pi, mark, acknowledged), daemon=True)
-        begun = time.monotonic()
-        work.start()
-        work.join(chance.uniform(0, lasted[act]) if is_during else None)
-        lasted[act] = lasted[act] if is_during else time.monotonic() - begun
-        pi.cut()
-        is_kept = acknowledged.is_set()
-        work.join()
-        say(f"cut {turn + 1} of {cuts}: {act.__name__}, {'' if is_kept else 'not '}acknowledged")
-        check(is_kept or is_during, f"{act.__name__} {mark} was not acknowledged")
-        pi.start()
-        pi.until(_HAS_BOARD)
-        failed = pi.run("systemctl --failed --plain --no-legend")
-        check(not failed, f"after cut {turn + 1} failed: {failed}")
-        found = int(re.sub(r"\D", "", pi.run("grep ^sysid /etc/naze-bridge/page.toml || true")) or 0)
-        if act is upload:
-            marks += [mark] if is_kept else []
-        else:
-            sysid = mark
-        check(found == sysid, f"after cut {turn + 1} the system id is {found}, not {sysid}")
-        lost = {*marks[-20:]} - marks_on_pi(pi)  # the page lists the newest 50
-        check(not lost, f"after cut {turn + 1} missions {lost} are lost")
+@dataclass(frozen=True)
+class Done:
+    """What the pilot was told: missions that the vehicle has accepted, and the system ids that may be saved."""
+
+    marks: frozenset[float] = frozenset({_FIRST_MARK})
+    sysids: frozenset[int] = frozenset({1})
+    #: What goes on now.
+    act: str = "nothing"
 
 
-def upload(pi: Pi, mark: int, acknowledged: Event) -> None:
-    with suppress(ClientError, OSError), station(pi) as gcs:
-        if gcs.write(mission(mark), lambda _: None) is MissionResult.ACCEPTED:
-            acknowledged.set()
+class Pilot(Thread):
+    """Sends missions and saves settings, one after the other, until `is_over` is set."""
 
+    def __init__(self, pi: Pi, done: Done) -> None:
+        super().__init__(daemon=True)
+        self._pi, self.done = pi, done
+        self.is_over = Event()
 
-def save(pi: Pi, mark: int, acknowledged: Event) -> None:
-    """A setting from the status page."""
-    with suppress(OSError, HTTPException, TrialError):
-        token = pi.run("cat /var/lib/naze-bridge/web-token").strip()
-        fetch(pi, "/api/pi", token, {"action": "settings", "values": {"sysid": mark}})
-        while not (job := fetch(pi, "/api/pi", token))["done"]:
+    def run(self) -> None:
+        for turn in count(1):
+            if self.is_over.is_set():
+                break
+            with suppress(ClientError, OSError, HTTPException, TrialError):
+                if turn % _SAVED:
+                    self._upload(_FIRST_MARK + turn / 4)
+                else:
+                    self._save(2 + turn // _SAVED)
+
+    def _upload(self, mark: float) -> None:
+        with station(self._pi) as gcs:
+            self.done = replace(self.done, act=f"upload of {mark}")
+            result = gcs.write(mission(mark), lambda _: None)
+        marks = {mark} if result is MissionResult.ACCEPTED else set()
+        self.done = replace(self.done, marks=self.done.marks | marks, act="connecting")
+
+    def _save(self, sysid: int) -> None:
+        """A setting from the status page."""
+        token = self._pi.run("cat /var/lib/naze-bridge/web-token").strip()
+        self.done = replace(self.done, sysids=self.done.sysids | {sysid}, act=f"save of {sysid}")
+        fetch(self._pi, "/api/pi", token, {"action": "settings", "values": {"sysid": sysid}})
+        while not (job := fetch(self._pi, "/api/pi", token))["done"]:
             time.sleep(0.2)
-        if "reply" in job:
-            acknowledged.set()
+        check("reply" in job, f"not saved: {job}")
+        self.done = replace(self.done, sysids=frozenset({sysid}), act="connecting")
+
+
+class Plug:
+    """Pulls the plug: copies of the card at random moments, each checked. Some are kept, to be started from later."""
+
+    def __init__(self, pi: Pi, seed: int, kept: int) -> None:
+        self._pi, self._kept = pi, kept
+        self.chance = random.Random(seed)
+        self.done = Done()
+        self.pulls = 0
+        self.cards: list[tuple[Card, Done]] = []
+
+    def pull(self, told: Callable[[], Done]) -> None:
+        self.pulls += 1
+        done, card = told(), Card(CACHE / "work" / f"pulled-{self.pulls}.img")
+        self._pi.copy_card(card.image)
+        say(f"pull {self.pulls}, {done.act}: {check_card(card, done)}")
+        if self.pulls % self._kept:
+            card.image.unlink()
+        else:
+            self.cards.append((card, done))
+
+
+def check_card(card: Card, done: Done) -> str:
+    """Compare a card with what was acknowledged before the plug was pulled; TrialError if something is lost."""
+    with card.mounted() as root:
+        opened = open_store(root / "var/lib/private/naze-bridge/missions.db", time.time())
+        with opened.store as store:
+            check(opened.set_aside is None, f"the mission store is damaged: {opened.set_aside}")
+            found = store.list(10_000)
+            kept = [store.get(each.number) for each in found if each.outcome == VERIFIED]
+        lost = done.marks - {mark_of(mission_items(each.received.items)) for each in kept if each is not None}
+        check(not lost, f"{done.act}: missions {lost} are lost: {found}")
+        page = root / "etc/naze-bridge/page.toml"
+        sysid = tomllib.loads(page.read_text())["sysid"] if page.exists() else 1
+        check(sysid in done.sysids, f"{done.act}: the system id is {sysid}, not of {done.sysids}")
+        run(_PROGRAM, "run", "--check-config", "--config", page.with_name("config.toml"))
+        status = ("--showformat", "${db:Status-Status} ${Package}\n", "--show")
+        packages = run("dpkg-query", "--admindir", root / "var/lib/dpkg", *status).splitlines()
+        odd = [line for line in packages if not line.startswith("installed ")]
+        check(not odd or "update" in done.act, f"{done.act}: {odd}")
+    rest = [each.outcome for each in found if each.outcome != VERIFIED]
+    return f"{len(done.marks)} acknowledged, {len(kept)} verified, others {rest}, id {sysid}, {odd or 'dpkg in order'}"
+
+
+def survives(pi: Pi, plug: Plug, pulls: int) -> None:
+    """The plug is pulled during uploads and saves of settings: the card has all that was acknowledged."""
+    pilot = Pilot(pi, plug.done)
+    pilot.start()
+    for turn in range(pulls):
+        if turn % 3:
+            while "upload" not in pilot.done.act:  # the shortest of the acts
+                time.sleep(0.01)
+        time.sleep(plug.chance.uniform(0, 1.5 if turn % 3 else 6))
+        plug.pull(lambda: pilot.done)
+    pilot.is_over.set()
+    pilot.join()
+    plug.done = pilot.done
+
+
+#: As the status page's update does it (service/cli/helper/packages.py), without keeping the present version.
+_UPDATE = """
+set -e
+mkdir -p /var/lib/naze-bridge-helper
+cp /root/{}.deb /var/lib/naze-bridge-helper/installing.deb
+dpkg --force-confold --install /var/lib/naze-bridge-helper/installing.deb
+rm /var/lib/naze-bridge-helper/installing.deb
+"""
+_IS_UPDATED = "[ ! -e /var/lib/naze-bridge-helper/installing.deb ]"
+
+
+def updates(pi: Pi, plug: Plug, pulls: int) -> None:
+    """The plug is pulled during an update and the way back: missions and settings are kept."""
+    for package, version in (("newer", NEWER), ("naze-bridge", "0.")):
+        work = Thread(target=pi.run, args=(_UPDATE.format(package),), daemon=True)
+        work.start()
+        for _ in range(pulls // 2):
+            work.join(plug.chance.uniform(0, 15))
+            if work.is_alive():
+                plug.pull(partial(replace, plug.done, act=f"update to {version}"))
+        work.join()
+        found = pi.run("dpkg-query --showformat '${Version}' --show naze-bridge")
+        check(found.startswith(version), f"version {found} instead of {version}")
+        pi.until(_HAS_BOARD)
+        plug.pull(lambda: plug.done)
+
+
+def start_again(pi: Pi, plug: Plug) -> None:
+    """The kept cards boot, and still have all that was acknowledged."""
+    pi.cut()
+    for card, done in plug.cards:
+        pi.start(card)
+        pi.until(f"{_IS_UPDATED} && {_HAS_BOARD} && {_HAS_HOTSPOT}", 3600)
+        failed = pi.run("systemctl --failed --plain --no-legend; dpkg --audit")
+        check(not failed, f"{card.image.stem}: failed: {failed}")
+        pi.cut()
+        say(f"{card.image.stem}, {done.act}, boots: {check_card(card, done)}")
+        card.image.unlink()
+
+
+def opens_a_hotspot(pi: Pi, _naze: Naze) -> None:
+    """Setup opens a hotspot. A phone joins it by another radio, and is led to the status page."""
+    pi.run(f"echo {_PASSWORD} >/root/password")
+    pi.run(f"{_SETUP} || true")  # 1: doctor found something, such as an open link
+    pi.until(_HAS_HOTSPOT)
+    said = pi.run(_PHONE)
+    check("302 http://10.42.0.1:8080/" in said, f"the phone is not led to the page: {said}")
+    check("200 " in said.splitlines()[-1], f"the phone does not get the page: {said}")
+
+
+#: A phone, in a network namespace of its own, with wlan1.
+_PHONE = f"""
+set -eu
+ip netns add phone
+mkdir -p /etc/netns/phone
+echo nameserver 10.42.0.1 >/etc/netns/phone/resolv.conf
+iw phy "$(cat /sys/class/net/wlan1/phy80211/name)" set netns name phone
+phone() {{ ip netns exec phone "$@"; }}
+phone ip link set lo up
+wpa_passphrase {_SSID} {_PASSWORD} >/root/phone.conf
+phone wpa_supplicant -B -i wlan1 -c /root/phone.conf >/dev/null
+printf '#!/bin/sh\n[ "$1" != bound ] || ip address add $ip/$mask dev $interface\n' >/root/bound
+chmod +x /root/bound
+phone udhcpc -i wlan1 -n -q -t 30 -s /root/bound >/dev/null 2>&1
+phone ip -4 address show wlan1 | grep -q 10.42.0.
+phone python3 - <<'GET'
+import http.client
+for host, port, path in (("connectivitycheck.gstatic.com", 80, "/generate_204"), ("10.42.0.1", 8080, "/")):
+    phone = http.client.HTTPConnection(host, port, timeout=120)
+    phone.request("GET", path)
+    reply = phone.getresponse()
+    print(reply.status, reply.headers["Location"])
+GET
+"""
 
 
 def fetch(pi: Pi, path: str, token: str = "", data: object = None) -> Any:
@@ -196,39 +351,39 @@ def fetch(pi: Pi, path: str, token: str = "", data: object = None) -> Any:
         return json.load(reply)
 
 
-def marks_on_pi(pi: Pi) -> set[float]:
-    """The marks of the missions that the Pi has stored and the board has verified."""
-    listed = [each["number"] for each in fetch(pi, "/api/missions")["missions"] if each["outcome"] == "VERIFIED"]
-    rows = [row["left"] for number in listed for row in fetch(pi, f"/api/missions/{number}")["rows"] if row["left"]]
-    return {row["alt_m"] for row in rows if row["seq"] == 2}
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cuts", type=int, default=8, help="how often the plug is pulled")
+    parser.add_argument("--pulls", type=int, default=100, help="how often the plug is pulled")
+    parser.add_argument("--boots", type=int, default=10, help="how many of those cards are started again")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", action="store_true", help="use the card of the last trial")
+    parser.add_argument("--keep", action="store_true", help="use the Pi's files of the last trial")
+    parser.add_argument("parts", nargs="*", help="functions of this program; without them all")
     given = parser.parse_args()
     missing = [package for package, path in _NEEDED.items() if not (shutil.which(path) or Path(path).exists())]
     if missing or os.geteuid() != 0:
         sys.exit(f"it needs root, and: sudo apt-get install {' '.join(missing)}" if missing else "it needs root (sudo)")
-    CACHE.mkdir(parents=True, exist_ok=True)
-    work, image = CACHE / "work", CACHE / "pi.img"
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    work = CACHE / "work"
     shutil.rmtree(work, ignore_errors=True)
-    work.mkdir()
+    work.mkdir(parents=True)
     if not given.keep:
-        say("the Pi's card, with the package")
-        make_card(image)
-    run("cp", "--sparse=always", image, work / "pi.img")
+        say("the Pi's files, with the package")
+        make_roots()
     run("make", "-C", PROJECT / "firmware", "sim", "APT=no")
     naze = Naze(work)
-    pi = Pi(work / "pi.img", work, naze.link)
+    pi = Pi(work, naze.link)
+    plug = Plug(pi, given.seed, max(given.pulls // max(given.boots, 1), 1))
+    parts: list[tuple[Callable[..., None], tuple[object, ...]]] = [
+        *((part, (pi, naze)) for part in (boots, is_examined, writes, arms, opens_a_hotspot)),
+        (survives, (pi, plug, given.pulls * 7 // 10)),
+        (updates, (pi, plug, given.pulls * 3 // 10)),
+        (start_again, (pi, plug)),
+    ]
     try:
-        for part in (boots, is_examined, writes, arms):
-            say(str(part.__doc__))
-            part(pi, naze)
-        say(str(survives.__doc__))
-        survives(pi, given.cuts, given.seed)
+        for part, words in parts:
+            if not given.parts or part.__name__ in given.parts:
+                say(str(part.__doc__))
+                part(*words)
         say("passed")
     except TrialError as error:
         sys.exit(f"FAILED: {error}")
