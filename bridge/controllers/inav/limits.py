@@ -161,8 +161,7 @@ class InavLimits:
             if leg.is_return:
                 yield from self._return(leg.target, records[leg.target], path.highest_cm, departure)
             if records[leg.target].action == NavAction.LAND and self.platform is Platform.AEROPLANE:
-                name = f"FW approach {self.approach.number} has no heading" if self.approach else _NO_APPROACHES
-                yield _landing(leg.target, self.approach, "", "here", name)
+                yield _landing(leg.target, self.approach)
         short_m = self.nav_wp_radius / 100
         close = [leg for leg in path.legs if leg.length_m < short_m and not (leg.is_first or leg.is_return)]
         within = f"within nav_wp_radius ({short_m:g} m): it may count as reached at once"
@@ -227,14 +226,14 @@ class InavLimits:
             yield Judgement(place, "alt_m", why)
         if (start := departure.place) is not None:
             near = self._near_safehome(start)
-            returns_there = self.safehome_usage_mode == SafehomeUsageMode.RTH
-            if near and returns_there:
+            if near and self.safehome_usage_mode == SafehomeUsageMode.RTH:
                 limit = f"safehome_max_distance is {self.safehome_max_distance / 100:g} m"
                 metres = distance_m(start, near)
                 why = f"returns to safehome {near.number}, {metres:.0f} m from home ({limit})"
                 yield Judgement(place, "p1", why, News.WARNING)
             if rth.p1 and self.platform is Platform.AEROPLANE:
-                yield self._landing_after_return(place, near, returns_there=returns_there)
+                # INAV lands by the approach of the nearest safehome, and there, even if it returns to home.
+                yield _landing(place, near.approach if near else None)
 
     def _near_safehome(self, start: Place) -> Safehome | None:
         """The one that INAV chooses where it is armed."""
@@ -243,28 +242,17 @@ class InavLimits:
         is_near = nearest is not None and distance_m(start, nearest) * 100 <= self.safehome_max_distance
         return nearest if is_near else None
 
-    def _landing_after_return(self, place: int, near: Safehome | None, *, returns_there: bool) -> Judgement:
-        """INAV lands by the approach of the nearest safehome, and there, even if it returns to home."""
-        if near is None:
-            why = f"no safehome within safehome_max_distance, {self.safehome_max_distance / 100:g} m"
-            return _landing(place, None, "", "at home", why)
-        name = f"FW approach {near.number} has no heading" if near.approach else _NO_APPROACHES
-        there = f"at safehome {near.number}"
-        return _landing(place, near.approach, f"{there} ", there if returns_there else "at home", name)
 
-
-def _landing(place: int, approach: FwApproach | None, where: str, otherwise: str, without: str) -> Judgement:
-    if approach and approach.directions():
-        headings = " or ".join(map(str, approach.directions()))
-        why = f"lands {where}by FW approach {approach.number}: heading {headings}"
+def _landing(place: int, approach: FwApproach | None) -> Judgement:
+    if approach and (headings := approach.directions()):
+        why = f"lands by FW approach {approach.number}: heading {' or '.join(map(str, headings))}"
         return Judgement(place, "command", why, News.NOTICE)
-    why = f"circles down {otherwise} and lands in any direction ({without})"
+    why = "circles down and lands in any direction: no FW approach"
     return Judgement(place, "command", why, News.WARNING)
 
 
 #: The first version whose missions do not climb above nav_max_altitude.
 _LIMITS_MISSIONS = 8, 0, 0
-_NO_APPROACHES = "no FW approach before INAV 7.1"
 _CHOICES: Mapping[str, type[IntEnum]] = {
     "nav_rth_alt_mode": RthAltMode,
     "safehome_usage_mode": SafehomeUsageMode,

@@ -142,8 +142,8 @@ def test_an_aeroplanes_return_names_the_approach_of_rally_points_written_since_t
     _, _, station = board_with(version="9.1.0", platform=_PLANE)
     there = replace(WP, lat_e7=LAT + 5000, lon_e7=LON)
     assert Upload(station, [HOME, there, RTL_LANDS]).run() is ACCEPTED
-    assert "circles down at home and lands in any direction (no safehome within" in " ".join(station.texts())
+    assert "circles down and lands in any direction: no FW approach" in " ".join(station.texts())
     rally = replace(RALLY_ITEMS[0], lat_e7=there.lat_e7, lon_e7=there.lon_e7)
     assert Upload(station, [rally], mission_type=RALLY).run() is ACCEPTED
     assert Upload(station, [HOME, there, RTL_LANDS]).run() is ACCEPTED
-    assert "circles down at safehome 0 and lands in any direction (FW approach 0 has no" in " ".join(station.texts())
+    assert "circles down and lands in any direction: no FW approach" in " ".join(station.texts())

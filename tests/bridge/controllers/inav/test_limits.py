@@ -25,7 +25,7 @@ NORTH = 8983
 LAND = item(Command.NAV_LAND)
 APPROACH = FwApproach(8, 5000, 350, turns_right=False, headings=(90, -10), is_above_sea=False)
 BY_APPROACH_3 = "FW approach 3: heading 90 or 270 or 10"
-NO_SAFEHOME = "circles down at home and lands in any direction (no safehome within safehome_max_distance, 200 m)"
+DOWN = "circles down and lands in any direction: no FW approach"
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
 
@@ -151,11 +151,8 @@ def test_another_selected_mission_is_named() -> None:
 @pytest.mark.parametrize(
     ("approach", "news"),
     [
-        (None, "circles down here and lands in any direction (no FW approach before INAV 7.1)"),
-        (
-            APPROACH._replace(headings=(0, 0)),
-            "circles down here and lands in any direction (FW approach 8 has no heading)",
-        ),
+        (None, DOWN),
+        (APPROACH._replace(headings=(0, 0)), DOWN),
         (APPROACH, "lands by FW approach 8: heading 90 or 270 or 10"),
         (
             APPROACH._replace(headings=(0, 360), is_above_sea=True),
@@ -175,19 +172,19 @@ def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str)
         (
             None,
             {},
-            [NO_SAFEHOME],
+            [DOWN],
         ),
         (
             Safehome(3, True, LAT + 3 * NORTH, LON, APPROACH._replace(number=3)),
             {},
-            [NO_SAFEHOME],
+            [DOWN],
         ),
         (
             Safehome(3, True, LAT + NORTH, LON),
             {},
             [
                 "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                "circles down at safehome 3 and lands in any direction (no FW approach before INAV 7.1)",
+                DOWN,
             ],
         ),
         (
@@ -195,7 +192,7 @@ def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str)
             {},
             [
                 "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                "circles down at safehome 3 and lands in any direction (FW approach 3 has no heading)",
+                DOWN,
             ],
         ),
         (
@@ -203,18 +200,18 @@ def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str)
             {},
             [
                 "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                f"lands at safehome 3 by {BY_APPROACH_3}",
+                f"lands by {BY_APPROACH_3}",
             ],
         ),
         (
             Safehome(3, True, LAT + NORTH, LON, APPROACH._replace(number=3)),
             {"safehome_usage_mode": SafehomeUsageMode.OFF},
-            [f"lands at safehome 3 by {BY_APPROACH_3}"],
+            [f"lands by {BY_APPROACH_3}"],
         ),
         (
             Safehome(3, True, LAT + NORTH, LON, FwApproach(3)),
             {"safehome_usage_mode": SafehomeUsageMode.OFF},
-            ["circles down at home and lands in any direction (FW approach 3 has no heading)"],
+            [DOWN],
         ),
     ],
 )
@@ -244,7 +241,7 @@ def test_an_aeroplanes_approach_is_read_and_the_mission_loaded_because_only_then
 def test_a_version_without_approaches_is_named() -> None:
     _, _, station = board_with(version="6.1.1", platform=1)
     assert Upload(station, [HOME, NEAR, replace(LAND, lat_e7=LAT + NORTH)]).run() is ACCEPTED
-    assert "WP 2: circles down here and lands in any direction" in " ".join(station.texts())
+    assert "WP 2: circles down and lands in any direction" in " ".join(station.texts())
 
 
 def test_the_boards_settings_are_read_by_name_and_again_after_a_change() -> None:
