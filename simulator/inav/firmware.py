@@ -113,7 +113,7 @@ class InavFirmware(MspFirmware):
         self._settings = InavSettings(settings, self._version)
         self._places = InavPlaces(places, self._version)
         self._navigation = InavNavigation(
-            self._mission, self._craft, self._settings, self._places, boot.options.platform
+            self._mission, self._craft, self._settings, self._places, boot.options.platform, self._version
         )
         self._booted_at = boot.now
         self._received = bytearray(self.habits.buffer_size)

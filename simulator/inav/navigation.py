@@ -60,12 +60,20 @@ class InavNavigation:
     """Flies `craft`. An index is a waypoint's number less 1."""
 
     def __init__(
-        self, mission: InavMission, craft: WaypointCraft, settings: InavSettings, places: InavPlaces, platform: int
+        self,
+        mission: InavMission,
+        craft: WaypointCraft,
+        settings: InavSettings,
+        places: InavPlaces,
+        platform: int,
+        version: tuple[int, ...],
     ) -> None:
         self._mission = mission
         self._settings = settings
         self._places = places
         self._platform = platform
+        #: Before, only climbs by the stick end at nav_max_altitude.
+        self._limits_missions = version >= (8, 0, 0)
         self._has_zone_return = False
         self._craft = craft
         self._home = craft.position
@@ -185,7 +193,7 @@ class InavNavigation:
         if waypoint.p3 & _MEAN_SEA_LEVEL:
             height -= FIELD_ALTITUDE_M
         highest_cm = int(self._settings["nav_max_altitude"])
-        if highest_cm and not self._settings["nav_wp_enforce_altitude"]:
+        if self._limits_missions and highest_cm and not self._settings["nav_wp_enforce_altitude"]:
             height = min(height, highest_cm / 100)
         if self._platform in _ON_THE_GROUND:
             height = 0.0

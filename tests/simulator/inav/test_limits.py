@@ -7,7 +7,10 @@ import pytest
 
 from protocols.msp.inav_places import FEATURE, SET_GEOZONE, SET_GEOZONE_VERTEX
 from protocols.msp.nav import NavAction
+from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
+from simulator.inav.boxes import BOXES
+from simulator.inav.boxes import NAV_WP as WP_MODE
 from simulator.inav.places import SET_FEATURE
 from tests.support.msp_bench import MspBench, waypoint
 
@@ -43,15 +46,17 @@ def test_a_first_waypoint_that_is_too_far_prevents_arming(first: object, within_
     assert bench.board.armed == (not flags)
 
 
-@pytest.mark.parametrize(("enforced_cm", "flown_m"), [(0, 15.0), (100, 20.0)])
+@pytest.mark.parametrize(
+    ("version", "enforced_cm", "flown_m"), [("9.1.0", 0, 15.0), ("9.1.0", 100, 20.0), ("7.1.2", 0, 20.0)]
+)
 def test_a_leg_is_flown_no_higher_than_nav_max_altitude_unless_heights_are_enforced(
-    enforced_cm: int, flown_m: float
+    version: str, enforced_cm: int, flown_m: float
 ) -> None:
-    bench = MspBench("inav", faults=Faults(boxes=0))
+    bench = MspBench("inav", MspOptions(version=version), faults=Faults(boxes=0))
     bench.set("nav_max_altitude", 1500)
     bench.set("nav_wp_enforce_altitude", enforced_cm)
     bench.upload([waypoint(8)])
-    bench.faults.armed, bench.faults.boxes = True, NAV_WP
+    bench.faults.armed, bench.faults.boxes = True, 1 << BOXES[version].index(WP_MODE)
     bench.run(60)
     truth = bench.board.truth(bench.now)
     assert truth is not None
