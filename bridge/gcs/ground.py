@@ -21,8 +21,6 @@ _EXPIRY_S = 60.0
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
 MAX_STATIONS = 32
-#: A connected station, whether or not it transfers a mission, is never silent for this long.
-_STILL_S = 1.0
 #: The interval between searches for silent stations.
 _EXPIRY_INTERVAL_S = 1.0
 
@@ -238,25 +236,6 @@ class Ground:
         else:
             self.remove_default_peer(RECORDER)
         self.outbox.recorder = self.station(RECORDER)
-
-    def elsewhere(self, sender: Sender) -> list[Sender]:
-        """The senders with these ids at other addresses."""
-        ids = sender.sysid, sender.compid
-        everywhere = (*self._heard.values(), *self._unproven.values())
-        return [there.senders[ids] for there in everywhere if ids in there.senders and there is not sender.station]
-
-    def moved(self, sender: Sender, now: float) -> Sender:
-        """The sender at its new address if it is silent at the old one and unknown at the new one before, else itself.
-
-        A second station with the same ids was heard earlier or meanwhile. The new address has proven the same rights.
-        """
-        old = sender.station
-        for there in self.elsewhere(sender) if now >= old.heard_at + _STILL_S else ():
-            new = there.station
-            is_same = new.peer.link == old.peer.link and new.standing is old.standing and new.return_path is None
-            if is_same and new.came_at >= old.heard_at:
-                return there
-        return sender
 
     # Messages to all stations.
 

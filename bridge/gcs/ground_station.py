@@ -253,7 +253,7 @@ class GroundStation:
         #: The highest MAVLink version that it has sent, and the version of replies: everything signed is MAVLink 2.
         self.version = 0
         self.frame_version = 2
-        self.came_at = self.heard_at = -inf
+        self.heard_at = -inf
         #: It is new, or has returned after a silence, perhaps restarted.
         self.is_back = False
         #: By sysid and compid.
@@ -312,9 +312,7 @@ class GroundStation:
     def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
         """Note a frame; returns the sender."""
         self.is_back = now >= self.heard_at + _RETURNS_S
-        if not self.is_heard:
-            self.is_heard, self.came_at = True, now
-        self.heard_at = now
+        self.is_heard, self.heard_at = True, now
         if self.version != 2:
             self.version = frame.version
             self.behaviour.speaks_v2 = self.version == 2

@@ -143,11 +143,6 @@ class ArrivingList:
         self.request.asked(wanted, now)
         return wanted
 
-    def moved(self) -> None:
-        """The sender's address has changed: frames may have been lost."""
-        if self._one_until < inf:
-            self._one_until = -inf
-
     def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | Reply | int:
         """Keep an item of this list. The number of the item that is requested next.
 

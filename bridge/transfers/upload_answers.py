@@ -24,7 +24,6 @@ _ACK_AGAIN_S = (0.02, 0.04, 0.06)
 #: An item that arrives sooner after the final ack was sent before it, and does not show that it was lost.
 _CROSSING_S = 0.4
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, sentences.NOT_WHOLE())
-_UNKNOWN_UPLOAD = Refusal(MissionResult.OPERATION_CANCELLED, sentences.UNKNOWN_UPLOAD())
 
 
 class UploadAnswers:
@@ -115,19 +114,13 @@ class UploadAnswers:
         sender.mission_ack(answer.ack, self._mission_type)
         return True
 
-    def late_item(self, sender: Sender, seq: int, now: float, *, is_lost: bool) -> None:
-        """Answer an item of an upload that has ended. If `is_lost`, perhaps because the daemon was restarted.
-
-        A ground station whose address has just changed does not get an answer.
-        """
+    def late_item(self, sender: Sender, seq: int, now: float) -> None:
+        """Answer an item of an upload that has ended."""
         answer = self._last(sender, now)
         if answer is not None:
             has_missed_it = seq == answer.count - 1 and now >= answer.sent_at + _CROSSING_S
             if answer.is_refusal or has_missed_it:
                 sender.mission_ack(answer.ack, self._mission_type)
-        elif is_lost and not any(self._last(where, now) for where in self._ground.elsewhere(sender)):
-            sender.say(_UNKNOWN_UPLOAD.why)
-            self.end(sender, _UNKNOWN_UPLOAD.ack, 0, now)
 
     def partial_list(self, sender: Sender, now: float) -> None:
         """MISSION_WRITE_PARTIAL_LIST: Mission Planner's answer to a refusal that it did not understand."""
@@ -136,10 +129,6 @@ class UploadAnswers:
             sender.mission_ack(answer.ack, self._mission_type)
         else:
             sender.refuse(_NOT_WHOLE, self._mission_type)
-
-    def has_answered(self, sender: Sender, now: float) -> bool:
-        """True if an upload from this address has just ended."""
-        return self._last(sender, now) is not None
 
     def forget(self, sender: Sender) -> None:
         """The ground station has begun a new upload."""

@@ -6,10 +6,9 @@ import pytest
 from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from simulator.board.options import SimOptions
-from tests.support.conversations import Upload, ack_message, count_message, item_message, list_message, waypoints
+from tests.support.conversations import ack_message, count_message, item_message, list_message, waypoints
 from tests.support.qgc_upload import QGC_HEARTBEAT
 from tests.support.upload_bench import (
-    OLD,
     A,
     acks,
     holding,
@@ -30,17 +29,6 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     world.run(1)
     assert acks(station) == [A.UNSUPPORTED]
     assert "A mission can only be written as a whole" in station.texts()
-
-
-def test_items_of_an_upload_begun_before_a_restart_are_refused_at_once() -> None:
-    world, station = holding()
-    for _ in range(3):
-        for seq in (11, 12, 13):
-            station.send(item_message(seq, OLD[seq]))
-        world.run(0.45)
-    assert [message.type for message in station.messages("MISSION_ACK")] == [A.OPERATION_CANCELLED] * 9
-    assert station.texts() == ["Unknown upload: write the mission again"]
-    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
 def test_a_repeated_last_item_does_not_get_a_reply_until_the_final_ack() -> None:
