@@ -15,11 +15,10 @@ from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
 from bridge.gcs.message_rates import fastest_s, take_due
 from bridge.missions.mission_service import MissionService
-from bridge.model.craft import Airframe, FlightMode, Home
+from bridge.model.craft import FlightMode, Home
 from bridge.model.missions import FlightReport, FlownMission, MissionProgress
 from bridge.model.vehicle import STALE_S, FlightState, Health, MissionLeg, Mode, Readiness, Reading
 from bridge.vehicle import vehicle_messages as make
-from bridge.vehicle.nav_words import NavWords, sentence_for
 from bridge.vehicle.readiness import CraftReadiness, ReadyState
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 from bridge.vehicle.vehicle_messages import Moment
@@ -29,7 +28,7 @@ from protocols.mavlink.codec import pack
 from protocols.mavlink.dialect import messages
 from protocols.msp.commands import Msp
 from protocols.msp.mission_flight import SUMMARY
-from protocols.msp.nav import NavStatus
+from protocols.msp.nav import NavState, NavStatus
 from reports.vehicle_groups import Progress
 from reports.verdict import SentSeqs
 
@@ -87,7 +86,7 @@ class OwnVehicle:
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
         #: The ground stations whose waypoint was set since the last report of the board.
         self._asked_current: list[Sender] = []
-        self._nav_words = NavWords()
+        self._is_emergency = False
         self.hear_station_time = session.vehicle.hear_station_time
         #: What a Harakiri's flight has decided, as it was last sent.
         self._summary = 0
@@ -323,7 +322,9 @@ class OwnVehicle:
             if self._said_why is not None:
                 self._ground.say(self._said_why)
         if isinstance(leg.report, NavStatus):
-            self._say_nav_words(leg.report, now)
+            was_emergency, self._is_emergency = self._is_emergency, leg.report.state == NavState.EMERGENCY_LANDING
+            if self._is_emergency and not was_emergency and self._session.vehicle.armed:
+                self._ground.say(sentences.EMERGENCY_LANDING())
             if why := self._missions.stopped(leg.report):
                 self._ground.say(sentences.LEFT_MISSION(why))
         if self._missions.on_board is None:
@@ -341,20 +342,6 @@ class OwnVehicle:
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
                 self._ground.outbox.multicast(pack(make.mission_item_reached(number)), stations)
-
-    def _say_nav_words(self, status: NavStatus, now: float) -> None:
-        """The numbers are those of the items, as each ground station counts them."""
-        vehicle, held = self._session.vehicle, self._missions.on_board
-        is_plane = vehicle.airframe is Airframe.FIXED_WING
-        words = self._nav_words.changed(status if vehicle.armed else None, now, is_plane=is_plane)
-        item = self._missions.seq_of(status.number)
-        if not words or ("{}" in words and not item):
-            return
-        flown = FlownMission(() if held is None else held.items, item)
-        for sent_seqs, stations in self._by_item_numbers(self._ground.everyone):
-            readers = [station for station in stations if not station.is_listener]
-            said = sentence_for(words)(words.format(*flown.counted(sent_seqs)))
-            self._ground.outbox.show(said, readers)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         if self._session.vehicle.armed and self._session.state.controller is None:

@@ -28,8 +28,7 @@ IN_COMMAND_LINE = Sentence(_WARNING, "Board in its CLI: type exit, or unplug it"
 FAILSAFE = Sentence(_CRITICAL, "Failsafe: the flight controller has taken over")
 FAILSAFE_ENDED = Sentence(_NOTICE, "Failsafe ended: the pilot has control")
 LEFT_MISSION = Sentence(_WARNING, "{}", "Returns: 199 m from the border of geozone 62")
-NAVIGATION = Sentence(_NOTICE, "{}", "ADJUSTING RTH ALTITUDE")
-EMERGENCY = Sentence(_CRITICAL, "{}", "EMERGENCY LANDING")
+EMERGENCY_LANDING = Sentence(_CRITICAL, "EMERGENCY LANDING")
 BANNER = Sentence(_INFO, "naze-bridge {}: {}", "0.3.1.dev12+g1234567", "no flight controller")
 
 # Arming. QGroundControl shows each text that begins with PreArm as a failure, and Mission Planner the last for 10 s.

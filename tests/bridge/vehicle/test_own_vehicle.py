@@ -3,9 +3,11 @@
 
 import pytest
 
+from protocols.msp.nav import NavAction, NavMode, NavState
 from simulator.board.options import Faults, SimOptions, Tree
 from tests.bridge.fc.test_msp_telemetry import flown, listening, m
-from tests.support.world import World
+from tests.bridge.vehicle.test_item_numbers import bench
+from tests.support.world import GroundStation, World
 
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
@@ -94,3 +96,15 @@ def test_home_before_arming_is_the_position(tree: Tree) -> None:
     world.run(3)
     home = station.messages("HOME_POSITION")[-1]
     assert (home.latitude, home.longitude) == (453838000, 84733000)
+
+
+def test_an_emergency_landing_of_an_inav_is_reported_once() -> None:
+    world, board = bench()
+    station = GroundStation(world)
+    station.stay_connected()
+    board.armed = True
+    for state in (NavState.RTH_ENROUTE, NavState.EMERGENCY_LANDING, NavState.EMERGENCY_LANDING):
+        board.nav = (NavMode.RTH, state, NavAction.RTH, 1, 0, 0)
+        world.run(2.5)
+    (text,) = [text for text in station.messages("STATUSTEXT") if text.severity == m.MAV_SEVERITY_CRITICAL]
+    assert text.text == "EMERGENCY LANDING"
