@@ -240,11 +240,6 @@ class Bridge:
         """Show a text to each ground station that connects from now on."""
         self._ground.notices.append(OF_THE_PI(text))
 
-    def link_closed(self, name: str, now: float) -> None:
-        """A link is closed, and all ground stations on it are gone."""
-        for peer in self._ground.remove_link(name):
-            self._types.peer_gone(peer, now)
-
     # Other programs, on a share.
 
     def program_joined(self, program: Program) -> None:

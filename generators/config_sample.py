@@ -12,7 +12,7 @@ _HEAD = (
     "It overrides setup.toml, the answers to `naze-bridge setup`.",
     "Flags of `naze-bridge run` override all files.",
     "`naze-bridge run --check-config --config FILE` checks the settings.",
-    '`systemctl reload naze-bridge` applies settings marked "live"; the others need a restart.',
+    "A change needs a restart: `systemctl restart naze-bridge`, in flight, too.",
 )
 _WIDTH = 100
 
@@ -26,9 +26,8 @@ def sample() -> str:
         if dot and before != table:
             table = before
             lines += ["", _comment(TABLES[table]), f"#[{table}]"]
-        note = " (live)" if key.is_live else ""
         value = key.default or key.example
-        lines += ["", _comment(key.meaning + note), f"#{name} = {value}"]
+        lines += ["", _comment(key.meaning), f"#{name} = {value}"]
     return "\n".join(lines) + "\n"
 
 

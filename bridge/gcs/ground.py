@@ -81,15 +81,6 @@ class Ground:
         self._unheard.pop(peer, None)
         self._has_changed()
 
-    def remove_link(self, name: str) -> list[Peer]:
-        """Forget all stations on a link. Returns those that were heard."""
-        for peer in [peer for peer in self._default_peers if peer.link == name]:
-            self.remove_default_peer(peer)
-        heard = [peer for peer in self._heard if peer.link == name]
-        for peer in [*heard, *(peer for peer in self._unheard if peer.link == name)]:
-            self.gone(peer)
-        return heard
-
     def station(self, peer: Peer) -> GroundStation | None:
         return self._heard.get(peer) or self._unheard.get(peer) or self._unproven.get(peer)
 

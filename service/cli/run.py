@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge run`: the daemon in the foreground."""
 
-from functools import partial
 from pathlib import Path
 
 import click
@@ -29,9 +28,8 @@ from terminal.command_group import PATH
 @click.option("--check-config", is_flag=True, help="Check the settings and exit.")
 def run(config: Path | None, gcs: tuple[str, ...], verbose: bool, check_config: bool, **flags: object) -> None:
     """Run the bridge between a flight controller and ground stations."""
-    load = partial(load_settings, config, gcs, **flags, log_level="debug" if verbose else None)
     try:
-        settings = load()
+        settings = load_settings(config, gcs, **flags, log_level="debug" if verbose else None)
     except SettingsError as error:
         raise click.UsageError(str(error)) from error
     if check_config:
@@ -39,4 +37,4 @@ def run(config: Path | None, gcs: tuple[str, ...], verbose: bool, check_config: 
         return
     from service.cli.serve import serve  # the whole daemon: --help does without
 
-    serve(settings, load)
+    serve(settings)

@@ -2,7 +2,7 @@
 """The daemon of `naze-bridge run`, with the control socket, page and zenoh node."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
     from service.zenoh_link.node import Node
 
 
-def serve(settings: Settings, load: Callable[[], Settings]) -> None:
+def serve(settings: Settings) -> None:
     """Run the daemon until a signal ends it. A failure ends the program with one sentence."""
     set_up_logging(settings.log_level)
     os.umask(0o077)  # logs and missions show where the pilot was. The unit sets the same
     try:
-        _serve(settings, load)
+        _serve(settings)
     except (ControlError, LinkError, StoreError, SettingsError, ZenohSettingsError) as error:
         fail(error)
 
 
-def _serve(settings: Settings, load: Callable[[], Settings]) -> None:
+def _serve(settings: Settings) -> None:
     assert settings.state_dir is not None
     with ExitStack() as stack:
         # An unwritable disk must not prevent a flight: the store reports it, and keeps missions in memory.
         with suppress(StateUnusableError):
             stack.enter_context(state_lock(settings.state_dir))
-        event_loop.run(_main(settings, load, socket_of_daemon(settings.state_dir)))
+        event_loop.run(_main(settings, socket_of_daemon(settings.state_dir)))
 
 
-async def _main(settings: Settings, load: Callable[[], Settings], socket_path: Path) -> None:
+async def _main(settings: Settings, socket_path: Path) -> None:
     daemon = Daemon(settings)
     control = ControlServer(daemon, socket_path)
     parts = list(_parts(settings, daemon))
@@ -53,7 +53,7 @@ async def _main(settings: Settings, load: Callable[[], Settings], socket_path: P
     for part in parts:
         part.start()
     try:
-        await run_until_signal(daemon, Notifier(), load)
+        await run_until_signal(daemon, Notifier())
     finally:
         for each in (control, *reversed(parts)):
             await each.close()

@@ -6,7 +6,6 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import Any, TypeVar
@@ -31,7 +30,7 @@ from service.daemon.fc_connection import FcConnection
 from service.daemon.flight_file import FlightFile
 from service.daemon.last_settings import LastSettings
 from service.daemon.store_worker import StoreWorker
-from service.links.gcs_links import GcsLink, LinkError, open_link
+from service.links.gcs_links import GcsLink, open_link
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
 from service.links.traffic import Traffic
@@ -97,31 +96,8 @@ class GcsConnections:
         """Open a link. Raises LinkError if that fails."""
         self.add(open_link(address, self))
 
-    def warn(self, address: GcsAddress) -> None:
-        if address.is_public:
-            _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
-
     def add(self, link: GcsLink) -> None:
         self.links[link.name] = link
-
-    def change(self, old: Sequence[GcsAddress], new: Sequence[GcsAddress]) -> tuple[GcsAddress, ...]:
-        """Replace links. Those that stay are not interrupted. Returns the open ones."""
-        for address in old:
-            if address not in new and (link := self.links.get(str(address))) is not None:
-                self._bridge.link_closed(link.name, self._loop.time())
-                self._flush()
-                del self.links[link.name]
-                link.close()
-                _log.info("gcs.closed", link=link.name)
-        for address in new:
-            if str(address) not in self.links:
-                try:
-                    self.open(address)
-                except LinkError as error:
-                    _log.error("gcs.unavailable", link=str(address), why=str(error))
-                else:
-                    self.warn(address)
-        return tuple(address for address in new if str(address) in self.links)
 
     def close(self) -> None:
         for link in self.links.values():
@@ -213,8 +189,8 @@ class Daemon:
             links = [str(address) for address in self.settings.gcs]
             _log.info("daemon.started", version=version(), fc=str(self.settings.fc), gcs=links)
             for address in self.settings.gcs:
-                if str(address) not in self.settings.access:
-                    self.gcs.warn(address)
+                if str(address) not in self.settings.access and address.is_public:
+                    _log.warning("gcs.open", link=str(address), what=_WHO_MAY_WRITE)
             for share in self.settings.share:
                 stack.callback(await open_share(share, self.bridge, self.flush))
             self._signing.start()
@@ -248,11 +224,6 @@ class Daemon:
     def reset_signing(self) -> None:
         """Forget the times of all ground stations: one with a wrong clock, or our own, may have shut others out."""
         self._signing.reset()
-
-    def change_links(self, gcs: Sequence[GcsAddress]) -> None:
-        """Serve ground stations over these links. Those that stay are not interrupted."""
-        # A link that cannot be opened is left out, so that the next reload tries it again.
-        self.settings = replace(self.settings, gcs=self.gcs.change(self.settings.gcs, gcs))
 
     def flush(self) -> None:
         """Carry out the effects that the bridge has after an input, and set its timer."""

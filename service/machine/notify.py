@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages to systemd, and its watchdog interval: sd_notify(3).
 
-The protocol is one datagram. The packages for it that have a wheel lack STOPPING and RELOADING, and
-may block on a slow systemd, which the links' loop must not.
+The protocol is one datagram. The packages for it that have a wheel lack STOPPING, and may block on a slow systemd,
+which the links' loop must not.
 """
 
 import os
 import socket
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 
@@ -23,12 +22,8 @@ class Notifier:
         self.watchdog_s = _watchdog_s(environment)
 
     def ready(self) -> None:
-        """The daemon is ready, or ready again after a reload."""
+        """The daemon is ready."""
         self._say("READY=1")
-
-    def reloading(self) -> None:
-        """A reload of the settings has begun; `ready` ends it."""
-        self._say(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
     def stopping(self) -> None:
         self._say("STOPPING=1")

@@ -8,8 +8,6 @@ from pathlib import Path
 from reprlib import Repr
 from typing import NamedTuple
 
-#: In a field's annotation: a reload applies the setting.
-LIVE = object()
 _repr = Repr()
 _repr.maxstring = _repr.maxother = _repr.maxlong = 80
 
@@ -64,7 +62,7 @@ class Reader(NamedTuple):
 class Key:
     """`name`: with the table, as "zenoh.prefix". `meaning`: one sentence, with the unit. `default`: as in the file.
 
-    `example`: for the sample file, if there is no default. `is_live`: a reload applies it.
+    `example`: for the sample file, if there is no default.
     """
 
     name: str
@@ -72,7 +70,6 @@ class Key:
     meaning: str
     default: str = ""
     example: str = ""
-    is_live: bool = False
 
 
 def short(value: object) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from bridge.config import BridgeSettings
 from service.settings.addresses import AddressError, AutoFc, FcAddress, GcsAddress, parse_fc, parse_table
-from service.settings.key import LIVE, Default, Example, file_name, several, text
+from service.settings.key import Default, Example, file_name, several, text
 from service.settings.web import WebSettings
 from service.settings.write_access import WriteAccess, parse_link
 from service.settings.zenoh import ZenohSettings
@@ -69,7 +69,6 @@ class Settings(BridgeSettings):
         '{address = "udpin:0.0.0.0:14550", key_file = "gcs.key", writers = ["192.168.4.0/24"]}, a link limits who may '
         "write.",
         Default(f'["{DEFAULT_GCS}"]'),
-        LIVE,
     ] = ()
     key_file: Annotated[
         Path | None,
@@ -98,9 +97,7 @@ class Settings(BridgeSettings):
         range(2, (1 << 20) + 1),
         "Size of all telemetry logs together, megabytes; the oldest are deleted, flights last.",
     ] = 256
-    log_level: Annotated[LogLevel, "Minimum level of logged events: debug, info, warning or error.", LIVE] = (
-        LogLevel.INFO
-    )
+    log_level: Annotated[LogLevel, "Minimum level of logged events: debug, info, warning or error."] = LogLevel.INFO
     access: Mapping[str, WriteAccess] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict, compare=False)
     zenoh: Annotated[

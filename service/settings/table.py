@@ -8,7 +8,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from service.settings.key import LIVE, Default, Example, Key, Reader, choice, file_name, text, whole, yes_no
+from service.settings.key import Default, Example, Key, Reader, choice, file_name, text, whole, yes_no
 from service.settings.settings import Settings
 
 
@@ -35,7 +35,7 @@ def _table_of(kind: type, prefix: str = "") -> Iterator[Key]:
         if not example and not shown:
             shown = _as_in_a_file(getattr(default, field.name))
         reader = found.get(Reader) or _reader_of(its_type, found.get(range))
-        yield Key(prefix + field.name, reader, found[str], shown, example, is_live=LIVE in notes)
+        yield Key(prefix + field.name, reader, found[str], shown, example)
 
 
 def _reader_of(kind: Any, numbers: range | None) -> Reader:

@@ -31,7 +31,7 @@ class BugError(Exception):
 
 async def test_a_bug_does_not_prevent_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     daemon = Daemon(Settings(parse_fc("sim:"), [], tmp_path / "state"))
-    running = asyncio.create_task(run_until_signal(daemon, Notifier({}), lambda: daemon.settings))
+    running = asyncio.create_task(run_until_signal(daemon, Notifier({})))
     await daemon.started.wait()
 
     def bug(_now: float) -> None:

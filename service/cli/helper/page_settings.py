@@ -11,7 +11,7 @@ from typing import Any
 
 from payloads.mission_data import Json
 from service.cli.helper.action import HelperRefusal, ThisPi
-from service.cli.setup.change import Run, Step, WriteFile
+from service.cli.setup.change import Step, WriteFile
 from service.cli.setup.steps import restart_changes
 from service.machine.host import Host
 from service.settings import load_settings
@@ -22,7 +22,6 @@ from service.settings.table import KEYS
 
 _FILE = str(SERVICE_CONFIG.with_name(PAGE_FILE))
 _HEAD = "# Written by the status page. setup.toml and config.toml, in this folder, override this.\n"
-_RELOAD = ("systemctl", "reload", "naze-bridge.service")
 #: The label and the unit on the page.
 _LABELS = {
     "sysid": ("MAVLink system id", ""),
@@ -77,9 +76,7 @@ def change_settings(pi: ThisPi, *, values: dict) -> Json:  # type: ignore[type-a
     if text == before or (not kept and not before):
         return pi.shown([])
     load_settings(host.path(SERVICE_CONFIG), (), text, state_dir=host.path(SERVICE_STATE))
-    is_live = all(_KEYS[name].is_live for name in values)
-    take_over = [Run(_RELOAD)] if is_live else restart_changes(host)
-    return pi.make([Step("save the settings", [WriteFile(_FILE, text), *take_over])])
+    return pi.make([Step("save the settings", [WriteFile(_FILE, text), *restart_changes(host)])])
 
 
 def _given(host: Host) -> Mapping[str, tuple[Any, str]]:

@@ -35,11 +35,7 @@ def disconnect(world: World, peer: Peer) -> None:
     world.bridge.gcs_gone(peer, world.now)
 
 
-def close_link(world: World, peer: Peer) -> None:
-    world.bridge.link_closed(peer.link, world.now)
-
-
-@pytest.mark.parametrize("leave", [fall_silent, disconnect, close_link])
+@pytest.mark.parametrize("leave", [fall_silent, disconnect])
 def test_hundreds_of_stations_that_have_left_are_forgotten(leave: Callable[[World, Peer], None]) -> None:
     world = ready_world()
     gc.collect()
