@@ -20,8 +20,6 @@ from protocols.mission_item import Command, Frame, MissionItem, MissionResult
 _READING_S = 20.0
 #: Requests waiting for the list to be read; further requests are dropped, and their senders repeat them.
 _MAX_QUESTIONS = 32
-#: Mission Planner repeats a request after 2.5 s. A position arrives within that time if there is a GPS.
-_POSITION_WAIT_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +41,6 @@ class MissionDownloads:
         #: Item 0 of a mission.
         self._has_home = missions.mission_type == messages.MAV_MISSION_TYPE_MISSION
         self._questions: dict[_Question, None] = {}
-        #: While home is unknown: the mission store of the flight controller, and when item 0 was first requested.
-        self._homeless: tuple[object, float] = None, 0.0
 
     def request_list(self, sender: Sender, now: float) -> None:
         """MISSION_REQUEST_LIST, armed or not."""
@@ -58,7 +54,7 @@ class MissionDownloads:
             download.until = now + _READING_S
             self._answer(question, download.items, now)
         elif self._vehicle.armed and seq == 0 and self._has_home:
-            self._send_home(question, now)
+            self._send_home(question)
         else:
             self._ask(question, now)
 
@@ -105,7 +101,7 @@ class MissionDownloads:
             self._answer(question, (), now)
         elif question.seq == 0 and self._has_home and (vehicle.armed or vehicle.home_or_position() is not None):
             # Mission Planner requests item 0 on arming, which may have just changed the protocol.
-            self._send_home(question, now)
+            self._send_home(question)
         elif question.seq != 0 or vehicle.armed is not None:
             sender.refuse(why, self._missions.mission_type)
         # Otherwise the craft may be armed: Mission Planner repeats the request until that is known.
@@ -131,18 +127,10 @@ class MissionDownloads:
         kind = self._missions.mission_type
         sender.to(item_message(item, sender.sysid, sender.compid, kind, as_int=question.as_int))
 
-    def _send_home(self, question: _Question, now: float) -> None:
-        """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it.
-
-        While no position is known, requests of the first 2 s get no answer: Mission Planner repeats them.
-        """
-        known, home = self._missions.home_item(), self._vehicle.home_or_position()
-        if known is None and home is None:
-            if self._homeless[0] is not self._missions.fc_store:
-                self._homeless = self._missions.fc_store, now
-            if now < self._homeless[1] + _POSITION_WAIT_S:
-                return
-        item = known or self._home_item()
+    def _send_home(self, question: _Question) -> None:
+        """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
+        home = self._vehicle.home_or_position()
+        item = self._missions.home_item() or self._home_item()
         if home is not None and home.altitude_m is not None:
             item = replace(item, alt_m=home.altitude_m)
         self._send_item(question, item)

@@ -39,8 +39,6 @@ _ASKS_FOR = {
     messages.MAV_CMD_GET_HOME_POSITION: messages.MAVLINK_MSG_ID_HOME_POSITION,
 }
 
-#: Gyro and barometer have no request in MSP.
-_CALIBRATED_AT_START = ({1: 1}, {3: 1}, {1: 1, 3: 1})
 #: Commands that would act on the aircraft.
 _REFUSED: Mapping[int, Sentence[()]] = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: sentences.ARM,
@@ -182,9 +180,6 @@ class CommandService:
             case messages.MAV_CMD_DO_ACCEPT_MAG_CAL | messages.MAV_CMD_DO_CANCEL_MAG_CAL:
                 # It is stored already. QGroundControl asks by a cancel if there is such a calibration.
                 return CommandResult.ACCEPTED
-            case messages.MAV_CMD_PREFLIGHT_CALIBRATION if _asked(params) in _CALIBRATED_AT_START:
-                sender.say(sentences.CALIBRATED_AT_START())
-                return CommandResult.DENIED
         if command in _ASKS_FOR:
             return self._send_once(sender, _ASKS_FOR[command], now)
         if command in _REFUSED:

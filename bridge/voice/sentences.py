@@ -78,7 +78,6 @@ CALIBRATING_NOW = Sentence(_ERROR, "Calibrating: try again when it is done")
 CALIBRATED = Sentence(_NOTICE, "{} calibration successful", "Compass")
 NOT_CALIBRATED = Sentence(_ERROR, "{} calibration failed: {}", "Compass", "use INAV Configurator")
 NOT_CANCELLED = Sentence(_ERROR, "Not cancelled: wait, or power the craft off")
-CALIBRATED_AT_START = Sentence(_ERROR, "Gyro and baro calibrate at each power-on")
 
 # Settings.
 SETTINGS_SAVED = Sentence(_INFO, "Settings saved")

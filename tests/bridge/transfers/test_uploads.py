@@ -332,6 +332,7 @@ class PlannerWrite:
         self._world, self._station, self._items = world, station, items
         self.seq, self.tries = -1, 0
         station.on_message.append(self._receive)
+        station.send(messages.MAVLink_request_data_stream_message(1, 1, messages.MAV_DATA_STREAM_EXTRA1, 4, 1))
         station.send(count_message(len(items)))
 
     def _receive(self, message: Message) -> None:

@@ -15,7 +15,6 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
-from tests.support.fake_inav import FakeInav
 from tests.support.screens import Screens
 from tests.support.world import GroundStation, World
 
@@ -226,9 +225,3 @@ def test_an_unsupported_calibration_is_refused_with_a_text() -> None:
     pages.world.run(0.5)
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [UNSUPPORTED]
     assert any("INAV Configurator" in text for text in pages.station.texts())
-    for gyro, baro in ((1, 0), (0, 1), (1, 1)):
-        pages.station.take()
-        pages.command(m.MAV_CMD_PREFLIGHT_CALIBRATION, gyro, 0, baro)
-        pages.world.run(2)
-        assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [DENIED]
-        assert any("power-on" in text for text in pages.station.texts())
