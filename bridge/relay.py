@@ -7,9 +7,8 @@ Everything else is passed on to the vehicle that it addresses, with new sequence
 link. Sans-IO.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from typing import Any
 
@@ -26,10 +25,10 @@ from bridge.model.events import BridgeEvent
 from bridge.model.missions import ARMED, ArrivedMission, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.transfers.downloads import MissionDownloads
+from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS, mission_handlers
 from bridge.transfers.uploads import MissionUploads
 from bridge.voice import sentences
-from protocols.mavlink.codec import decode, item_from_float_message, item_from_int_message, repack
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.codec import decode, repack
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_heartbeat
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
@@ -46,20 +45,14 @@ _UNKNOWN = Refusal(MissionResult.DENIED, sentences.VEHICLE_UNKNOWN())
 #: A ground station's messages about the mission that is on a vehicle.
 _MISSION_REQUESTS = frozenset(
     (
-        m.MAVLINK_MSG_ID_MISSION_COUNT,
+        *READS,
+        *ENDS_DOWNLOAD,
         m.MAVLINK_MSG_ID_MISSION_ITEM,
         m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
-        m.MAVLINK_MSG_ID_MISSION_ACK,
-        m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
         m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
         m.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
     )
 )
-#: MISSION_ITEM.current of items outside a list.
-_GUIDED = (2, 3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,18 +105,8 @@ class Relay:
         self._runner = Runner(lambda _effect: None)
         self.missions = _RemoteMissions(Vehicle(), self._runner, self.ground, self.effects)
         self.uploads = MissionUploads(self.missions, self.ground, _ignore)
-        downloads = self._downloads = MissionDownloads(self.missions, self.ground)
-        uploads = self.uploads
-        self._handlers: Mapping[int, Callable[[Sender, Message, float], object]] = {
-            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
-            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, item_from_float_message),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, item_from_int_message),
-            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
-        }
+        self._downloads = MissionDownloads(self.missions, self.ground)
+        self._handlers = mission_handlers(self.uploads, self._downloads)
 
     @property
     def due(self) -> float:
@@ -161,9 +144,6 @@ class Relay:
             if sender is not None and not self._is_answered(sender, frame, now):
                 self.effects.append(SendToVehicle(frame.raw))
 
-    def _item(self, convert: Callable[[Message], MissionItem], sender: Sender, message: Message, now: float) -> None:
-        self.uploads.item(sender, convert(message), now)
-
     def _is_answered(self, sender: Sender, frame: MavlinkFrame, now: float) -> bool:
         handler = self._handlers.get(frame.msgid) if self.missions.is_local else None
         if handler is None or frame.target not in self._targets:
@@ -171,28 +151,16 @@ class Relay:
         message = decode(frame)
         if message is None or getattr(message, "mission_type", 0) != m.MAV_MISSION_TYPE_MISSION:
             return False
-        if getattr(message, "current", 0) in _GUIDED and not self.uploads.is_writing(sender):
+        if getattr(message, "current", 0) in GUIDED and not self.uploads.is_writing(sender):
             return False
-        if frame.msgid in _READS:
+        if frame.msgid in READS:
             self.uploads.answers.went_on(sender)
             self.uploads.reads(sender, now)
-        elif frame.msgid in _ENDS_DOWNLOAD:
+        elif frame.msgid in ENDS_DOWNLOAD:
             self.uploads.answers.went_on(sender)
             self._downloads.forget(sender)
         handler(sender, message, now)
         return True
-
-
-_READS = (
-    m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-    m.MAVLINK_MSG_ID_MISSION_REQUEST,
-    m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-)
-_ENDS_DOWNLOAD = (
-    m.MAVLINK_MSG_ID_MISSION_COUNT,
-    m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-    m.MAVLINK_MSG_ID_MISSION_ACK,
-)
 
 
 class _RemoteMissions(MissionService):

@@ -3,7 +3,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from functools import partial
 from itertools import product
 from math import inf
 
@@ -17,27 +16,22 @@ from bridge.gcs.station import Peer
 from bridge.missions.place_lists import NO_PLACES
 from bridge.model.events import Emit, GcsRefused
 from bridge.settings.parameters import Parameters
-from bridge.transfers.downloads import MissionDownloads
-from bridge.transfers.mission_types import Transfers
-from bridge.transfers.uploads import MissionUploads
+from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS, Handler, Transfers
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.voice import sentences
 from bridge.voice.happening import Sentence
-from protocols.mavlink.codec import FrameWriter, decode, file_refusal, item_from_float_message, item_from_int_message
+from protocols.mavlink.codec import FrameWriter, decode, file_refusal
 from protocols.mavlink.dialect import MESSAGE_FORMATS, CommandResult, Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mavlink.frame import MavlinkFrame
-from protocols.mission_item import MissionItem, MissionResult
+from protocols.mission_item import MissionResult
 from protocols.rights import Effect
 from protocols.rights.mavlink import effect_of
 
 #: The reason why the frames of such a sender are ignored.
 OWN_IDS = "sent with the vehicle's own sysid and compid"
 
-
-#: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".
-_GUIDED = (2, 3)
 
 #: Messages of other buttons, which are not acknowledged.
 _TOLD: Mapping[int, Sentence[()]] = {
@@ -52,30 +46,13 @@ _TOLD: Mapping[int, Sentence[()]] = {
 }
 
 #: Messages of a mission transfer: hundreds a second over a fast link. All others are rare.
-_OF_A_TRANSFER = frozenset(
-    {
-        m.MAVLINK_MSG_ID_MISSION_COUNT,
-        m.MAVLINK_MSG_ID_MISSION_ITEM,
-        m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-        m.MAVLINK_MSG_ID_MISSION_ACK,
-    }
-)
-
-_ENDS_DOWNLOAD = frozenset(
-    {m.MAVLINK_MSG_ID_MISSION_COUNT, m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL, m.MAVLINK_MSG_ID_MISSION_ACK}
-)
-
-_READS = frozenset(
-    {
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-    }
-)
-
-_Handler = Callable[[Sender, Message, float], object]
+_ITEMS = frozenset({m.MAVLINK_MSG_ID_MISSION_ITEM, m.MAVLINK_MSG_ID_MISSION_ITEM_INT})
+_OF_A_TRANSFER = _ITEMS | {
+    m.MAVLINK_MSG_ID_MISSION_COUNT,
+    m.MAVLINK_MSG_ID_MISSION_REQUEST,
+    m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+    m.MAVLINK_MSG_ID_MISSION_ACK,
+}
 
 
 class Incoming:
@@ -109,10 +86,8 @@ class Incoming:
         self._vehicle = vehicle
         self._commands = commands
         self._transfers = transfers
-        #: The handlers of mission messages, by the type of their lists.
-        self._of_type = {kind: self._mission_handlers(each.uploads, each.downloads) for kind, each in transfers.items()}
-        self._handlers: Mapping[int, _Handler] = {
-            **self._of_type[m.MAV_MISSION_TYPE_MISSION],
+        self._handlers: Mapping[int, Handler] = {
+            **transfers[m.MAV_MISSION_TYPE_MISSION].handlers,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: lambda s, msg, now: commands.set_current(s, msg.seq, now),
             m.MAVLINK_MSG_ID_COMMAND_LONG: lambda s, msg, now: commands.take(
                 s, msg.command, [getattr(msg, f"param{number}") for number in range(1, 8)], now
@@ -251,19 +226,6 @@ class Incoming:
 
     # Messages for the vehicle.
 
-    def _mission_handlers(self, uploads: MissionUploads, downloads: MissionDownloads) -> Mapping[int, _Handler]:
-        return {
-            m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
-            m.MAVLINK_MSG_ID_MISSION_ITEM: partial(self._item, uploads, item_from_float_message),
-            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: partial(self._item, uploads, item_from_int_message),
-            m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
-            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
-            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
-            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
-        }
-
     def _take(self, sender: Sender, frame: MavlinkFrame, msgid: int, now: float) -> None:
         """Handle a frame for the bridge's vehicle, if it is understood and the sender has not sent too many."""
         if msgid in _TOLD:
@@ -279,18 +241,22 @@ class Incoming:
             return
         mission_type = getattr(message, "mission_type", m.MAV_MISSION_TYPE_MISSION)
         clears_all = msgid == m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL and mission_type == m.MAV_MISSION_TYPE_ALL
-        if msgid in _READS or msgid in _ENDS_DOWNLOAD:
+        if msgid in READS or msgid in ENDS_DOWNLOAD:
             for kind in self._transfers.values():
                 if kind.uploads.answers.due < inf:
                     kind.uploads.answers.went_on(sender)
         of_type = self._transfers.get(m.MAV_MISSION_TYPE_MISSION if clears_all else mission_type)
         if of_type is not None and of_type.lists.are_stored:
-            if msgid in _READS:
+            if msgid in READS:
                 of_type.uploads.reads(sender, now)
-            if msgid in _ENDS_DOWNLOAD:
+            if msgid in ENDS_DOWNLOAD:
                 of_type.downloads.forget(sender)
-            # Messages about no list have the type of missions.
-            (self._of_type[of_type.lists.mission_type].get(msgid) or handler)(sender, message, now)
+            if msgid in _ITEMS and message.current in GUIDED and not of_type.uploads.is_writing(sender):
+                self._commands.refuse(sender, m.MAV_CMD_NAV_WAYPOINT)
+                sender.mission_ack(MissionResult.DENIED)
+            else:
+                # Messages about no list have the type of missions.
+                (of_type.handlers.get(msgid) or handler)(sender, message, now)
         elif msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST and of_type is not None:
             # Mission Planner ignores a refusal, and times out after 5 s.
             sender.say(sentences.ONLY_MISSIONS())
@@ -304,20 +270,6 @@ class Incoming:
             for number in (m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY):
                 if self._transfers[number].lists.are_stored:
                     self._transfers[number].uploads.clear_all(sender, number, now)
-
-    def _item(
-        self,
-        uploads: MissionUploads,
-        convert: Callable[[Message], MissionItem],
-        sender: Sender,
-        message: Message,
-        now: float,
-    ) -> None:
-        if message.current in _GUIDED and not uploads.is_writing(sender):
-            self._commands.refuse(sender, m.MAV_CMD_NAV_WAYPOINT)
-            sender.mission_ack(MissionResult.DENIED)
-        else:
-            uploads.item(sender, convert(message), now)
 
     def _refuse_file(self, sender: Sender, message: Message, _now: float) -> None:
         if (answer := _denial(message, sender)) is not None:
