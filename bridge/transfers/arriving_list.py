@@ -3,7 +3,6 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from math import inf
 from typing import Any
 
@@ -20,14 +19,6 @@ _MAX_TIMEOUT_S = 0.75
 #: then. Later repeats are rarer: Mission Planner gives up after ten that it received.
 _OFTEN_S = 1.5
 _SELDOM_S = 0.7
-
-
-class Reply(Enum):
-    """The response to an item that neither completes the list nor leads to the next request."""
-
-    NONE = auto()
-    #: The item belongs to another list: discard this list, and request item 0.
-    START_AGAIN = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,22 +129,16 @@ class ArrivingList:
         self.request.asked(wanted, now)
         return wanted
 
-    def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | Reply | int:
-        """Keep an item of this list. The number of the item that is requested next.
-
-        An item that contradicts the list shows that its station has started again.
-        """
+    def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | int | None:
+        """Keep an item of this list. The number of the item that is requested next, or None if none is."""
         seq, held = item.seq, self.items.get(item.seq)
-        # As text, because NaN, "not given", differs from itself.
-        if held is not None and repr(held) != repr(item):
-            return Reply.START_AGAIN
         if not self.items:
             self._one_until = sender.frames
         if held is None or seq == self.request.seq:
             self.request.answered(seq, now)
             self.progress_at = now
         elif sender.is_copy or self.request.explains_repeat(seq):
-            return Reply.NONE
+            return None
         if held is None:
             self.items[seq] = item
             while self._judged in self.items:

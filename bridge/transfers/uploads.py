@@ -21,7 +21,7 @@ from bridge.missions.list_check import begin_check, check_count
 from bridge.missions.mission_service import DeliveryResult, MissionService, MissionTransfer, TransferStep
 from bridge.model.events import Emit, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
-from bridge.transfers.arriving_list import Reply, WholeList
+from bridge.transfers.arriving_list import WholeList
 from bridge.transfers.upload_answers import UploadAnswers
 from bridge.transfers.upload_states import (
     TRANSITIONS,
@@ -133,17 +133,16 @@ class MissionUploads:
         elif item.seq >= upload.count:
             beyond = Refusal(MissionResult.INVALID_SEQUENCE, sentences.BEYOND_THE_COUNT(item.seq, upload.count))
             sender.refuse(beyond, self._missions.mission_type)
+        elif (held := state.list.items.get(item.seq)) is not None and repr(held) != repr(item):
+            # Of another list. Compared as text, because NaN, "not given", differs from itself.
+            self._handle(upload, _AGAIN, now)
+            self._begin(sender, upload.count, now)
         else:
             taken = state.list.take(item, sender, now)
             if isinstance(taken, int):
                 self._request(upload, taken)
-            elif taken is Reply.START_AGAIN:
-                self._handle(upload, _AGAIN, now)
-                self._begin(sender, upload.count, now)
-            elif isinstance(taken, WholeList):
+            elif taken is not None:
                 self._arrived(upload, taken, now)
-            else:
-                self.due = min(self.due, state.due)
 
     def ack(self, sender: Sender, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels the upload, ACCEPTED ends "Write Fast"."""

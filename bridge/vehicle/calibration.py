@@ -4,8 +4,8 @@
 The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
 
-No firmware reports the result over MSP. A calibrated accelerometer reads a level craft. A Harakiri stores a compass
-calibration and then restarts. A Harakiri does nothing else meanwhile, so its silence is not reported as a loss.
+No firmware reports the result over MSP. A Harakiri stores it and then restarts. It does nothing else meanwhile, so its
+silence is not reported as a loss.
 """
 
 import math
@@ -17,7 +17,7 @@ from bridge.fc.session import FcSession
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
-from bridge.line.conversation import Conversation, LinkLost, Pause, Receive, ask, ask_status, send
+from bridge.line.conversation import Conversation, LinkLost, Receive, ask_status, send
 from bridge.missions.mission_service import MissionService
 from bridge.settings.board_settings import BoardSettings
 from bridge.vehicle.readiness import CraftReadiness
@@ -27,7 +27,7 @@ from protocols.mavlink.dialect import CommandResult
 from protocols.mavlink.dialect import messages as m
 from protocols.msp.commands import Msp, MspAction
 from protocols.msp.frame import Direction, MspFrame, request
-from protocols.msp.telemetry import RAW_IMU_SIZE, STATUS_SIZE, Sensor, decode_raw_imu
+from protocols.msp.telemetry import STATUS_SIZE, Sensor
 from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
@@ -49,10 +49,6 @@ _COMPASS, _ONE_COMPASS = 0, 1 << 0
 _UNKNOWN = (math.nan,) * 10
 _STATUS_CHECKS = 2
 _ASKS_AFTER_ACTION = 12
-#: After a restart the first readings may still settle.
-_SETTLED_S, _LEVEL_CHECKS, _LEVEL_INTERVAL_S = 1.0, 5, 0.1
-#: In g: 3 degrees. An uncalibrated sensor is off by as much.
-_MAX_TILT = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,17 +209,9 @@ class Calibration:
         self._readiness.calibrates(now)
         if self._restarts and elapsed_s >= _LONGEST_S:
             self._end("no answer, power cycle", now)
-        elif self._action is CALIBRATE_COMPASS:
-            is_stored = not self._restarts or elapsed_s >= _SHORTEST_COMPASS_S
-            self._end("" if is_stored else "interrupted", now)
         else:
-            self._missions.runner.start(_is_level(), self._looked, now)
-
-    def _looked(self, level: bool | LinkLost | None, now: float) -> None:
-        if level is True:
-            self._end("", now)
-        else:
-            self._end("not level, or moved" if level is False else "no answer", now)
+            is_short = self._action is CALIBRATE_COMPASS and self._restarts and elapsed_s < _SHORTEST_COMPASS_S
+            self._end("interrupted" if is_short else "", now)
 
     def _end(self, failure: str, now: float) -> None:
         """Report the result. `failure`: the reason, empty if it was successful."""
@@ -261,20 +249,6 @@ class Calibration:
 
     def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
         sender.to(m.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid))
-
-
-def _is_level() -> Conversation[bool | None]:
-    """True if the accelerometer reads a level craft, as it does right after the calibration, or None without answer."""
-    yield Pause(_SETTLED_S)
-    forward = left = up = 0
-    for _ in range(_LEVEL_CHECKS):
-        reply = yield from ask(request(Msp.RAW_IMU), Msp.RAW_IMU, RAW_IMU_SIZE)
-        imu = None if reply is None else decode_raw_imu(reply.payload)
-        if imu is None:
-            return None
-        forward, left, up = (total + value for total, value in zip((forward, left, up), imu.acc, strict=True))
-        yield Pause(_LEVEL_INTERVAL_S)
-    return max(abs(forward), abs(left)) <= _MAX_TILT * up
 
 
 def _act(action: FcAction, arm_bit: int) -> Conversation[ActionResult]:

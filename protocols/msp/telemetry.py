@@ -13,8 +13,6 @@ from protocols.plain_text import PlainText, plain_text
 _IDENT = struct.Struct("<BBBI")
 _STATUS = struct.Struct("<HHHIB")
 STATUS_SIZE = _STATUS.size
-_RAW_IMU = struct.Struct("<9h")
-RAW_IMU_SIZE = _RAW_IMU.size
 _RAW_GPS = struct.Struct("<BBiihH")
 _ATTITUDE = struct.Struct("<hhh")
 _ALTITUDE = struct.Struct("<ih")
@@ -60,14 +58,6 @@ class StatusReport(NamedTuple):
     box_flags: int
 
 
-class RawImu(NamedTuple):
-    """MSP_RAW_IMU: x, y, z of accelerometer, gyro and compass. Each firmware has its own units."""
-
-    acc: tuple[int, int, int]
-    gyro: tuple[int, int, int]
-    mag: tuple[int, int, int]
-
-
 class RawGps(NamedTuple):
     """MSP_RAW_GPS: degrees * 1e7, metres above sea level, cm/s; course in 0.1 degrees and HDOP * 100 where sent.
 
@@ -105,13 +95,6 @@ def decode_status(payload: bytes) -> StatusReport | None:
         return None
     cycle_time, i2c_errors, sensors, box_flags, _ = _STATUS.unpack_from(payload)
     return StatusReport(cycle_time, i2c_errors, Sensor(sensors), box_flags)
-
-
-def decode_raw_imu(payload: bytes) -> RawImu | None:
-    if len(payload) < _RAW_IMU.size:
-        return None
-    values = _RAW_IMU.unpack_from(payload)
-    return RawImu(values[0:3], values[3:6], values[6:9])
 
 
 def decode_channels(payload: bytes) -> tuple[int, ...] | None:

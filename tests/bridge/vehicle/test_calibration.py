@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
+from tests.support.fake_inav import FakeInav
 from tests.support.screens import Screens
 from tests.support.world import GroundStation, World
 
@@ -170,14 +171,6 @@ def test_mission_planner_sees_at_once_that_a_calibrating_craft_is_not_ready() ->
     pages.start_accelerometer(WIZARD)
     pages.world.run(2)
     assert not pages.screens.mission_planner.ready.at(pages.world.now)
-
-
-def test_a_tilted_craft_fails_the_accelerometer_calibration() -> None:
-    pages = CalibrationPages(faults=Faults(acc=(60, 0, 500)))
-    pages.start_accelerometer(LEVEL)
-    pages.world.run(30)
-    assert pages.wizard_result == "Accel calibration failed: not level, or moved"
-    assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION)[-1] == FAILED
 
 
 def test_another_loss_afterwards_is_reported() -> None:

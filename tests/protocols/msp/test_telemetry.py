@@ -13,7 +13,6 @@ from protocols.msp import telemetry as t
 #: Each decoder and Harakiri's reply, the shortest one accepted.
 LEAST: list[tuple[Callable[[bytes], object], bytes]] = [
     (t.decode_status, struct.pack("<HHHIB", 3000, 7, 0b1011, 0x21, 0)),
-    (t.decode_raw_imu, struct.pack("<9h", *range(-4, 5))),
     (t.decode_channels, struct.pack("<4H", 1500, 1501, 1502, 1003)),
     (t.decode_raw_gps, struct.pack("<BBiihH", 1, 9, 453838000, -84733000, 131, 250)),
     (t.decode_attitude, struct.pack("<3h", 105, -32, -170)),
