@@ -114,9 +114,7 @@ def schemas() -> dict[str, Json]:
         },
         "time_source": {
             "type": "string",
-            "description": "gps: from the flight controller's 3D fix (an autopilot's SYSTEM_TIME, INAV's MSP_RTC), "
-            "used if the Pi's clock is off by more than 0.5 s; ntp: the clock was set over the network since the "
-            "start; pi: neither, it may be hours off",
+            "description": "ntp: the Pi's clock was set over the network since the start; pi: it may be hours off",
         },
         **_fields(VehicleReport),
     }

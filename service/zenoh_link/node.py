@@ -9,6 +9,8 @@ Anything that may wait takes the session's thread:
 """
 
 import asyncio
+import os
+import time
 from collections.abc import Callable
 from functools import partial
 from math import inf
@@ -29,6 +31,7 @@ from reports.vehicle_groups import Group
 from service.daemon.api import DaemonApi
 from service.daemon.daemon import Daemon, Follower
 from service.daemon.telemetry_logs import TelemetryLogs
+from service.machine.raspberry_pi import SYNCHRONIZED
 from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
@@ -38,7 +41,6 @@ from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
 from service.zenoh_link.session import SessionThread, log_outages
-from service.zenoh_link.time_source import SampleClock
 
 _STATE_INTERVAL_S, _OVERVIEW_INTERVAL_S = 1.0, 10.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}
@@ -56,8 +58,8 @@ class Node(Follower):
         config = make_config(settings)
         self._endpoints, self._tls_files = connect_endpoints(config), tls_files(config)
         self._thread = SessionThread(config, self._declare)
-        self._clock = SampleClock(self._loop.time)
-        self._payloads = Payloads(self._clock.unix_s)
+        # A Pi's clock is not better than a millisecond, and each digit costs data.
+        self._payloads = Payloads(lambda: round(time.time(), 3))
         self._publisher = Publisher(self._payloads, self._readers_changed)
         self._presence = Liveliness(settings.vehicle, self._emit)
         self._mavlink = MavlinkLink(self._publisher, daemon.gcs, self._presence.others)
@@ -151,7 +153,7 @@ class Node(Follower):
         return {
             "vehicle": self._settings.vehicle,
             "others_of_this_name": len(self._presence.others),
-            "time_source": self._clock.source(self._daemon.bridge.vehicle),
+            "time_source": "ntp" if os.path.exists(SYNCHRONIZED) else "pi",
             **plain(self._daemon.report()),
         }
 

@@ -95,4 +95,4 @@ def test_replies_and_samples_have_a_time(start: Starter) -> None:
         (reply,) = opened.get(key("state"))
         assert reply.ok is not None
         assert reply.ok.timestamp is not None
-        assert body(reply.ok)["time_source"] in {"gps", "ntp", "pi"}
+        assert body(reply.ok)["time_source"] in {"ntp", "pi"}
