@@ -211,11 +211,6 @@ class Bridge:
         trouble = self._session.state.trouble
         return "" if trouble is None else trouble.text
 
-    @property
-    def is_searching(self) -> bool:
-        """True while a port is open and the flight controller is not identified yet."""
-        return self._session.state.is_searching
-
     # The ground stations' side.
 
     def gcs_received(self, peer: Peer, data: bytes, now: float, *, datagram: bool) -> bool:

@@ -22,8 +22,6 @@ _NONCES = 1 << 47
 _ROUND = 4
 #: A client may send a dozen requests before the answer arrives.
 _ENOUGH_QUESTIONS = 16
-#: The reason why frames of such a station are ignored.
-NOT_SHOWN = "behind a router, and answers no PING or TIMESYNC"
 
 
 class ReturnPath:
@@ -57,11 +55,6 @@ class ReturnPath:
         if frame.msgid == m.MAVLINK_MSG_ID_PING:
             return answer is not None and answer.target_system != 0 and answer.time_usec == self._nonce
         return answer is not None and answer.tc1 != 0 and answer.ts1 == self._nonce
-
-    @property
-    def has_failed(self) -> bool:
-        """True if the station has left many questions unanswered."""
-        return self._asked > _ENOUGH_QUESTIONS
 
     def question(self) -> Message | None:
         """The next message to go with a heartbeat: together they stay within three times a heartbeat's size."""

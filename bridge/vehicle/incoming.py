@@ -9,7 +9,6 @@ from math import inf
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
-from bridge.gcs.return_path import NOT_SHOWN
 from bridge.gcs.rights import FrameRefusal
 from bridge.gcs.routes import Routes
 from bridge.gcs.station import Peer
@@ -140,8 +139,8 @@ class Incoming:
                 return False
             sender = self._ground.heard(station, frame, ids, now)
             if sender is None:
-                self._ignore_unproven(station, frame)
-            elif refused is not None:
+                continue  # a text tells a station that does not answer the questions
+            if refused is not None:
                 self._answer_refused(refused, sender, frame)
             elif self.routes is not None:
                 self._pass_on(self.routes, sender, frame, effect)
@@ -166,11 +165,6 @@ class Incoming:
         recorded = self._ground.outbox.recorded
         if recorded is not None and not station.is_listener and station.allows(Cost.RECORDED):
             recorded.append(frame.raw)
-
-    def _ignore_unproven(self, station: GroundStation, frame: MavlinkFrame) -> None:
-        """Report a station that has not shown that it receives anything, once it had several opportunities."""
-        if station.return_path is not None and station.return_path.has_failed:
-            self._ignore(NOT_SHOWN, station, frame)
 
     def _pass_on(self, routes: Routes, sender: Sender, frame: MavlinkFrame, effect: Effect) -> None:
         """Send a frame on to its targets, within its sender's rights."""

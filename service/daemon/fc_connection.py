@@ -31,8 +31,6 @@ from service.settings import Settings
 from service.settings.addresses import AutoFc, SerialFc, UdpFc
 from storage.os_error import reason
 
-#: The interval of messages about an unsuccessful search: a silent log looks like a hang.
-_SEARCH_REPORT_S = 60.0
 #: The pause after a bug, before the port is opened again.
 _RESTART_S = 1.0
 #: The reason given to `on_close` at the end of the daemon.
@@ -275,7 +273,6 @@ class FcConnection:
         self._speed: int | None = None
         # While replies to polls are gathered.
         self._is_held = False
-        self._search_report: asyncio.TimerHandle | None = None
         #: On the loop's clock; `found_at` None without a flight controller; `lost_at` None: none was lost since.
         self.found_at: float | None = None
         self.lost_at: float | None = None
@@ -330,9 +327,7 @@ class FcConnection:
                 yield device
 
     def close(self) -> None:
-        """Stop the timers. The port closes with `run`."""
-        if self._search_report is not None:
-            self._search_report.cancel()
+        """Stop the search. The port closes with `run`."""
         if self._finder is not None:
             self._finder.close()
 
@@ -363,7 +358,7 @@ class FcConnection:
     def _opened(self) -> None:
         self._bridge.fc_opened(self._loop.time())
         self._flush()
-        self._report_search()
+        _log.info("fc.searching", fc=self.where)
 
     def _received(self, data: bytes, now: float) -> None:
         if self._bridge.fc_received(data, now):
@@ -373,9 +368,3 @@ class FcConnection:
         self._bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self._flush()
 
-    def _report_search(self) -> None:
-        if self._search_report is not None:
-            self._search_report.cancel()
-        if self._bridge.is_searching:
-            _log.info("fc.searching", fc=self.where)
-        self._search_report = self._loop.call_later(_SEARCH_REPORT_S, self._report_search)

@@ -124,8 +124,6 @@ class State(ABC):
     """One state. `receive` and `tick` return the event that ends it, or None."""
 
     name: ClassVar[str]
-    #: True while the flight controller is being searched for.
-    is_searching: ClassVar[bool] = False
     #: The reason why the board cannot be used, and the remedy, or None if it can be.
     trouble: ClassVar[Happening | None] = None
     #: The flight controller on the line, or None until it is identified.

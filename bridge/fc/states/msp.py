@@ -112,7 +112,6 @@ class Identifying(MspLine):
     """MSP is answered. The board is being identified."""
 
     name = "identifying"
-    is_searching = True
 
     def __init__(self, port: Port, event: Found, now: float) -> None:
         owed = event.pending.size(event.speed, now)

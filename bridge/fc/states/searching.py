@@ -68,7 +68,6 @@ class Searching(State):
     """The protocol and speed are being searched for."""
 
     name = "searching"
-    is_searching = True
 
     def __init__(self, port: Port, event: PortOpened | Lost, now: float) -> None:
         super().__init__(port, event, now)

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import time
-import tty
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,12 +13,11 @@ import pytest
 from structlog.testing import capture_logs
 
 from bridge.model.vehicle import Source
-from service.daemon import fc_connection
 from service.daemon.client import ControlError, ask_daemon
 from service.daemon.daemon import Daemon
 from service.machine.host import Host
 from service.settings import Settings
-from service.settings.addresses import SerialFc, SimulatedFc
+from service.settings.addresses import SimulatedFc
 from tests.support.benches import Starter
 from tests.support.inside import inside
 from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, free_port, until
@@ -75,22 +73,6 @@ def test_an_unread_log_does_not_stop_the_daemon(tmp_path: Path) -> None:
             daemon.kill()
     os.close(full)
     os.close(unread)
-
-
-async def test_a_search_without_result_is_reported_repeatedly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fc_connection, "_SEARCH_REPORT_S", 0.01)
-    near, far = os.openpty()
-    tty.setraw(far)
-    with capture_logs() as events:
-        running = asyncio.create_task(Daemon(Settings(SerialFc(os.ttyname(far), None))).run())
-        async with asyncio.timeout(TIMEOUT_S):
-            while len([event for event in events if event["event"] == "fc.searching"]) < 3:  # noqa: ASYNC110
-                await asyncio.sleep(0.01)
-        running.cancel()
-        with suppress(asyncio.CancelledError):
-            await running
-    os.close(near)
-    os.close(far)
 
 
 async def test_a_wrong_clock_is_reported_until_a_network_sets_it(tmp_path: Path) -> None:
