@@ -42,12 +42,11 @@ from bridge.transfers.mission_types import MissionTypes
 from bridge.transfers.mission_watch import MissionWatch
 from bridge.transfers.uploads import FC_LOST, STOPPED
 from bridge.vehicle.calibration import Calibration
-from bridge.vehicle.commands import CommandService
+from bridge.vehicle.commands import CommandService, SetWaypoint
 from bridge.vehicle.compass_check import CompassCheck
 from bridge.vehicle.incoming import Incoming
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.readiness import CraftReadiness
-from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_report import VehicleReporter
 from bridge.voice.sentences import OF_THE_PI
 from protocols.mavlink.frame import MavlinkFrame

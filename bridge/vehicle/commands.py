@@ -6,7 +6,7 @@ DO_SET_MISSION_CURRENT on an INAV that flies the mission.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from bridge.fc.fc_settings import Cause, SettingRefusal
@@ -15,6 +15,8 @@ from bridge.fc.session import FcSession
 from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import Sender
+from bridge.missions.fc_mission_store import FliesToItems
+from bridge.missions.mission_service import HeldMission, MissionService
 from bridge.model.craft import MISSION_BOXES
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import MissionLeg, Switches
@@ -24,12 +26,12 @@ from bridge.settings.setting_work import Answer
 from bridge.vehicle.calibration import CALIBRATE_ACCELEROMETER, CALIBRATE_COMPASS, Calibration, FcAction
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.vehicle.readiness import ReadyState
-from bridge.vehicle.set_waypoint import SetWaypoint
 from bridge.vehicle.vehicle_messages import auto_mode
 from bridge.voice import sentences
 from bridge.voice.happening import Happening, Sentence
 from protocols.mavlink.dialect import CommandResult, command_name, messages
 from protocols.mission_item import MissionResult
+from protocols.rights import Effect
 
 _MAX_MSGID = (1 << 24) - 1
 
@@ -73,6 +75,74 @@ _NOT_STORED = {
     Cause.OCCUPIED: CommandResult.TEMPORARILY_REJECTED,
     Cause.LIMIT: CommandResult.TEMPORARILY_REJECTED,
 }
+_NOT_FLOWN = Refusal(MissionResult.DENIED, sentences.SET_IN_FLIGHT())
+_UNKNOWN = Refusal(MissionResult.DENIED, sentences.SET_ON_CHANGED_LIST())
+_BUSY = Refusal(MissionResult.DENIED, sentences.SET_TOO_SOON())
+
+
+class SetWaypoint:
+    """Set WP: the item that an armed craft flies to, on boards that have a request for that (INAV), one at a time.
+
+    Nothing else that a ground station sends changes a flight. It takes the right to move a passed-through autopilot,
+    which a station on an open link does not have.
+    """
+
+    def __init__(self, missions: MissionService, vehicle: OwnVehicle, ground: Ground) -> None:
+        self._missions = missions
+        self._vehicle = vehicle
+        self._ground = ground
+        #: The station and the item of the request in progress.
+        self._present: tuple[Sender, float] | None = None
+
+    @property
+    def is_possible(self) -> bool:
+        """True if the flight controller has a request for it."""
+        return isinstance(self._missions.fc_store, FliesToItems)
+
+    def begin(self, sender: Sender, seq: float, on_end: Callable[[Refusal | None], None], now: float) -> None:
+        """Make the craft fly to item `seq`, in the station's numbers. `on_end` gets None once it does.
+
+        A repetition of the request in progress is ignored.
+        """
+        if self._present == (sender, seq):
+            return
+        store, held = self._missions.fc_store, self._missions.on_board
+        assert isinstance(store, FliesToItems)
+        if (refusal := self._obstacle(sender)) is not None or held is None:
+            on_end(refusal or _UNKNOWN)
+            return
+        item = self._as_read(held, sender, seq)
+        if not (number := store.leg_of(held.records, item)):
+            on_end(Refusal(MissionResult.DENIED, _why_not(held, item, seq)))
+            return
+
+        def ended(refused: Refusal | None, _at: float) -> None:
+            self._present = None
+            if refused is not None:
+                self._vehicle.progress.set_to = 0
+            else:
+                self._vehicle.confirm_current(sender)
+                self._ground.say(sentences.SET_BY_ANOTHER(), but=sender.station)
+            on_end(refused)
+
+        self._present = sender, seq
+        self._vehicle.withhold_current(sender.station, now)
+        self._vehicle.progress.set_to = number
+        self._missions.run(store.fly_to(held.records, number), ended, now)
+
+    def _obstacle(self, sender: Sender) -> Refusal | None:
+        if (refused := sender.station.passing_refusal(Effect.MOVE)) is not None:
+            return Refusal(MissionResult.DENIED, sentences.SET_WITHOUT_RIGHT(refused.why))
+        if not self._missions.vehicle.armed:
+            return _NOT_FLOWN
+        if self._present is not None or self._missions.runner.needs_line:
+            return _BUSY
+        return None if sender.station.allows(Cost.BOARD) else _BUSY
+
+    def _as_read(self, held: HeldMission, sender: Sender, seq: float) -> int:
+        """The number in the list as read back of the item that the station calls `seq`, or 0 if there is none."""
+        numbers = self._vehicle.sent_seqs(sender.station) or range(len(held.items))
+        return next((number for number, shown in enumerate(numbers) if shown == seq), 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,3 +329,9 @@ def _action(command: int, params: Sequence[float]) -> FcAction | None:
 def _asked(params: Sequence[float]) -> dict[int, float]:
     """The parameters that are set, by number from 1."""
     return {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
+
+
+def _why_not(held: HeldMission, item: int, seq: float) -> Happening:
+    if item:
+        return sentences.SET_TO_ACTION(seq, command_name(held.items[item].command))
+    return sentences.SET_TO_HOME() if seq == 0 else sentences.SET_TO_MISSING(seq)

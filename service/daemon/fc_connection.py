@@ -367,4 +367,3 @@ class FcConnection:
     def _closed(self, why: str) -> None:
         self._bridge.fc_closed(self._loop.time(), None if why in (STOPPED, MOVED_ON) else why)
         self._flush()
-

@@ -64,7 +64,8 @@ def begun(baud: int, protocol: TelemetryProtocol) -> World:
 
 @cache
 def identification_s(baud: int, protocol: TelemetryProtocol) -> float:
-    return begun(baud, protocol).wait_until(lambda w: w.inside.session.state.name not in ("searching", "identifying"), 20)
+    searches = "searching", "identifying"
+    return begun(baud, protocol).wait_until(lambda w: w.inside.session.state.name not in searches, 20)
 
 
 def identifying(baud: int, seed: int, protocol: TelemetryProtocol = TelemetryProtocol.MSP) -> World:
