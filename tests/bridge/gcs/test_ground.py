@@ -6,8 +6,6 @@ from functools import partial
 
 import pytest
 from fastcrc.crc16 import mcrf4xx
-from hypothesis import given
-from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.gcs.ground_station import GroundStation as GcsStation
@@ -304,35 +302,6 @@ def test_our_own_frames_are_not_mistaken_for_a_station() -> None:
     assert len(world.inside.ground.peers()) == before
 
 
-def test_each_kind_of_station_gets_pieces_of_a_long_text_as_it_shows_them() -> None:
-    """MAVSDK requests no streams and joins the pieces; Mission Planner shows each by itself."""
-    world = ready_world()
-    mavsdk, planner, old = GroundStation(world, "a"), GroundStation(world, "b"), GroundStation(world, "c", version=1)
-    for station in (mavsdk, planner, old):
-        station.send(gcs_heartbeat())
-    for station in (mavsdk, planner, old):
-        station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_REQUEST_MESSAGE, 0, 148, *[0] * 6))
-    planner.send(messages.MAVLink_request_data_stream_message(1, 1, messages.MAV_DATA_STREAM_ALL, 4, 1))
-    world.run(1)
-    text = "The flight controller limits flash wear: one write in 5 minutes now, no limit after a restart"
-    for long in (text, text[:50], text[:51], text[:50] * 2):
-        for station in (mavsdk, planner, old):
-            station.take()
-        world.inside.ground.say(sentences.CHANGED_ITEM(long))
-        world.run(0.1)
-        pieces = [piece.text.rstrip("\0") for piece in mavsdk.messages("STATUSTEXT")]
-        assert "".join(pieces) == long
-        assert all(len(piece) == 50 for piece in pieces[:-1])
-        assert len(pieces) == 1 or len(pieces[-1]) < 50
-    for station in (mavsdk, planner, old):
-        station.take()
-    world.inside.ground.say(sentences.CHANGED_ITEM(text))
-    world.run(0.1)
-    words = text.split()
-    for station in (planner, old):
-        assert [word for piece in station.texts() for word in piece.split()] == words
-
-
 def test_texts_are_split_without_loss() -> None:
     texts = [
         "short",
@@ -350,13 +319,6 @@ def test_texts_are_split_without_loss() -> None:
         assert len(found[-1]) <= (50 if len(found) == 1 else 49)
         assert "".join("".join(found).split()) == "".join(text.split())
         assert all(found[:-1])
-
-
-@given(st.lists(st.integers(1, 49), min_size=1, max_size=20))
-def test_pieces_joined_without_a_space_have_the_same_words(sizes: list[int]) -> None:
-    """As MAVSDK and QGroundControl join them."""
-    words = [chr(ord("a") + number % 26) * size for number, size in enumerate(sizes)]
-    assert "".join(pieces(" ".join(words), Kind.UNKNOWN)).split() == words
 
 
 def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:

@@ -9,11 +9,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.model.missions import Outcome
-from bridge.transfers.upload_states import Asking, Delivering, Receiving
+from bridge.transfers.upload_states import Asking, Delivering
 from protocols.float32 import single
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
-from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import SimOptions
 from tests.support.conversations import (
     MISSION,
     Upload,
@@ -25,7 +25,6 @@ from tests.support.conversations import (
     rounded,
     waypoints,
 )
-from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from tests.support.screens import Screens
 from tests.support.upload_bench import (
     OLD,
@@ -94,13 +93,6 @@ def test_an_upload_while_armed_is_denied() -> None:
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_an_upload_while_armed_in_mavlink_mode_is_denied() -> None:
-    world, station = holding(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
-    world.faults.armed = True
-    world.run(5)
-    refused(world, station, 5, A.DENIED, "Armed")
-
-
 def test_arming_while_items_arrive_denies_the_upload() -> None:
     world, station = holding()
     receiving(world, station, waypoints(50), 10)
@@ -112,16 +104,6 @@ def test_arming_while_items_arrive_denies_the_upload() -> None:
     world.run(1)
     assert_refusal_is_repeated(world, station, A.DENIED)
     assert world.store.outcomes()[-1] is Outcome.REJECTED
-
-
-def test_arming_briefly_while_items_arrive_denies_the_upload() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(50), 10)
-    world.faults.armed = True
-    world.run(0.4)
-    world.faults.armed = False
-    world.run(1)
-    assert acks(station) == [A.DENIED]
 
 
 @pytest.mark.parametrize("message", [count_message(0), clear_message(), clear_message(255)])
@@ -228,15 +210,6 @@ def test_a_slow_upload_does_not_delay_others() -> None:
     world.run(20)
     assert acks(slow) == [A.ACCEPTED]
     assert world.stored == records_of(waypoints(4, 1))
-
-
-def test_an_upload_started_again_and_again_does_not_delay_others() -> None:
-    world, restless = holding()
-    for again in range(4):
-        world.after(3.4 * again, lambda again=again: restless.send(count_message(9 + again)))  # type: ignore[misc]
-    world.run(3.4 * 3 + 0.1)
-    assert state(world) is Receiving
-    assert Upload(GroundStation(world, "pilot", sysid=254), waypoints(4)).run(2.4) is A.ACCEPTED
 
 
 def test_unfinished_uploads_do_not_delay_others() -> None:
@@ -462,24 +435,6 @@ def test_an_upload_without_a_link_is_denied() -> None:
         station.send(message)
         world.run(0.1)
         assert acks(station) == [A.DENIED]
-
-
-def test_an_upload_before_any_flight_controller_is_denied() -> None:
-    world = World(powered=False)
-    station = GroundStation(world)
-    refused(world, station, 5, A.DENIED, "No link")
-
-
-def test_an_upload_to_a_harakiri_without_the_extension_is_unsupported() -> None:
-    world = World(faults=Faults(extension=False))
-    world.wait_ready()
-    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "lacks the mission patch")
-
-
-def test_an_upload_to_another_flight_controller_is_unsupported() -> None:
-    world = World(peer=MspFake({100: ident(240, HARAKIRI_CAPABILITY), 2: b"BTFL", 116: b"ARM;", 101: bytes(11)}))
-    world.wait_until(lambda w: w.is_found, 3)
-    refused(world, GroundStation(world), 5, A.UNSUPPORTED, "cannot store missions")
 
 
 def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:

@@ -8,7 +8,6 @@ from functools import partial
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.missions.mission_service import NO_LINK
 from protocols.mavlink.dialect import Message
 from protocols.msp.frame import MspParser
 from simulator.board.msp_sensors import SensorReplies
@@ -92,19 +91,6 @@ def test_storing_saves_unsaved_settings_and_is_then_silent() -> None:
     assert operations[0] == operations[1] > 0
 
 
-def test_storing_while_armed_is_acknowledged_silently() -> None:
-    """Nothing was changed here, so nothing is unsaved."""
-    world, station = a_world()
-    world.faults.armed = True
-    world.run(1)
-    station.take()
-    station.send(long(STORAGE, (1, 0, 0, 0, 0, 0, 0)))
-    world.run(1)
-    assert results(station) == [ACCEPTED]
-    assert station.texts() == []
-    assert done(world) == []
-
-
 @pytest.mark.parametrize("what", [0, 2, math.nan, math.inf])
 def test_settings_are_not_loaded_or_reset(what: float) -> None:
     world, station = a_world()
@@ -139,17 +125,6 @@ def test_does_not_act_unless_the_arming_state_can_be_read(tele_prot: TelemetryPr
         assert len(results(station)) == 1
         assert results(station)[0] in (DENIED, FAILED)
     assert done(world) == []
-
-
-def test_without_a_flight_controller_an_action_is_denied() -> None:
-    world = World(powered=False)
-    station = GroundStation(world)
-    for command, params, _ in ALL:
-        station.send(long(command, params))
-        world.run(0.1)
-    assert results(station) == [DENIED] * len(ALL)
-    # The text of a refusal is not repeated.
-    assert station.texts() == [f"{name} calibration failed: no flight controller" for name in NAMES.values()]
 
 
 def test_on_unknown_firmware_an_action_is_unsupported() -> None:
@@ -265,38 +240,6 @@ def test_no_other_command_reaches_the_flight_controller() -> None:
 
 
 # Texts of refusals.
-
-
-def test_a_refusals_text_goes_once_in_ten_seconds_to_each_station() -> None:
-    world, first = a_world()
-    for _ in range(7):
-        first.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
-        world.run(0.5)
-    assert results(first) == [DENIED] * 7
-    assert first.texts() == ["Arm and disarm with the transmitter"]
-    second = GroundStation(world, "second")
-    second.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
-    world.run(0.1)
-    assert second.texts() == ["Arm and disarm with the transmitter"]
-    assert len(first.texts()) == 1
-    world.run(8)
-    first.send(long(400, (1, 0, 0, 0, 0, 0, 0)))
-    world.run(0.1)
-    assert len(first.texts()) == 2
-
-
-def test_seven_downloads_from_a_lost_board_are_answered_with_one_text() -> None:
-    """Mission Planner asks for the list seven times, 0.7 s apart."""
-    world, station = a_world()
-    world.unplug()
-    world.run(5)
-    station.take()
-    station.send(m.MAVLink_request_data_stream_message(1, 1, 0, 2, 1))
-    for _ in range(7):
-        station.send(m.MAVLink_mission_request_list_message(1, 1, 0))
-        world.run(0.7)
-    assert len(station.messages("MISSION_COUNT")) == 7
-    assert station.texts().count(NO_LINK.text) == 1
 
 
 @pytest.mark.parametrize("current", [2, 3])

@@ -177,14 +177,6 @@ def test_the_current_waypoint_cannot_be_set() -> None:
     assert asking.messages("MISSION_CURRENT")
 
 
-def test_without_a_flight_controller_a_command_names_that_reason() -> None:
-    world = World(powered=False)
-    station = GroundStation(world)
-    station.send(m.MAVLink_mission_set_current_message(1, 1, 3))
-    world.run(1)
-    assert "No flight controller: the command has no effect" in station.texts()
-
-
 def test_set_wp_in_mission_planner_ends_at_once() -> None:
     """Without one MISSION_CURRENT its window hangs for 12 s, while it repeats the request six times."""
     world, asking, other = two_stations()
