@@ -15,7 +15,7 @@ from bridge.model.missions import Refusal, TransferMemory
 from bridge.voice.happening import Happening, Severity
 from bridge.voice.stations import BadNews, Behaviour, Kind, pieces, rendered
 from protocols.mavlink.codec import FrameWriter, Packed, pack
-from protocols.mavlink.dialect import Message, messages
+from protocols.mavlink.dialect import CommandResult, Message, messages
 from protocols.mavlink.frame import MAGIC_V2, MavlinkFrame, MavlinkSplitter
 from protocols.mavlink.signing import Check
 from protocols.mission_item import MissionResult
@@ -207,6 +207,9 @@ class Sender:
 
     def say(self, happening: Happening, *, is_routine: bool = False) -> None:
         self.station.say(happening, is_routine=is_routine)
+
+    def command_ack(self, command: int, result: CommandResult) -> None:
+        self.to(messages.MAVLink_command_ack_message(command, result, 0, 0, self.sysid, self.compid))
 
     def mission_ack(self, result: MissionResult, mission_type: int = 0) -> None:
         self.to(messages.MAVLink_mission_ack_message(self.sysid, self.compid, result, mission_type))

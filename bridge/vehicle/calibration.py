@@ -113,7 +113,7 @@ class Calibration:
         self._result_acks.clear()
         if action in (self._asked_for, self._action):
             # Repeated by the user or duplicated by the network.
-            self._acknowledge(sender, command, CommandResult.IN_PROGRESS)
+            sender.command_ack(command, CommandResult.IN_PROGRESS)
         elif self._action is not None:
             self._asked(sender, command, action, ActionResult.RUNNING, now)
         elif not sender.station.allows(Cost.FLASH):
@@ -160,7 +160,7 @@ class Calibration:
         if self._restarts:
             sender.say(sentences.RESTARTS_AFTERWARDS())
         if command == m.MAV_CMD_DO_START_MAG_CAL:
-            self._acknowledge(sender, command, result)
+            sender.command_ack(command, result)
         self._sender, self._command, self._action = sender, command, action
         self._began_at = self._acknowledge_at = now
         self._readiness.calibrates(now + (_LONGEST_S if self._restarts else self._usual_s))
@@ -169,7 +169,7 @@ class Calibration:
 
     def _refuse(self, sender: Sender, command: int, action: FcAction, outcome: ActionResult) -> None:
         sender.say(sentences.NOT_CALIBRATED(action.name, outcome.why))
-        self._acknowledge(sender, command, outcome.ack)
+        sender.command_ack(command, outcome.ack)
 
     def tick(self, now: float) -> None:
         """Report a running calibration, and end it when its time has passed."""
@@ -185,7 +185,7 @@ class Calibration:
             self._send_progress(now)
         elif now >= self._acknowledge_at:
             self._acknowledge_at = now + _ACK_INTERVAL_S
-            self._acknowledge(self._sender, self._command, CommandResult.IN_PROGRESS)
+            self._sender.command_ack(self._command, CommandResult.IN_PROGRESS)
 
     def controller_found(self, now: float) -> None:
         """The flight controller answers again."""
@@ -229,7 +229,7 @@ class Calibration:
     def _acknowledge_result(self, now: float) -> None:
         self.due = now + _RESULT_AGAIN_S if self._result_acks else inf
         if self._result_acks:
-            self._acknowledge(self._sender, self._command, self._result_acks.pop())
+            self._sender.command_ack(self._command, self._result_acks.pop())
 
     def _send_progress(self, now: float, percent: int | None = None) -> None:
         """MAG_CAL_PROGRESS: the part of the usual time."""
@@ -246,9 +246,6 @@ class Calibration:
         Not "autosaved", after which it demands a reboot: the board has restarted by itself, or needs none.
         """
         self._sender.to(m.MAVLink_mag_cal_report_message(_COMPASS, _ONE_COMPASS, status, 0, *_UNKNOWN))
-
-    def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
-        sender.to(m.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid))
 
 
 def _act(action: FcAction, arm_bit: int) -> Conversation[ActionResult]:

@@ -167,7 +167,7 @@ class CommandService:
         elif command == messages.MAV_CMD_DO_SET_MISSION_CURRENT and self._set_waypoint.is_possible:
             self._do_set_current(sender, params[0], params[1], now)
         elif action is None:
-            self._acknowledge(sender, command, self._do(sender, command, params, now))
+            sender.command_ack(command, self._do(sender, command, params, now))
         else:
             self._calibration.take(sender, command, action, now)
 
@@ -185,7 +185,7 @@ class CommandService:
         def ended(refusal: Refusal | None) -> None:
             self._set(sender, refusal, now)
             result = CommandResult.ACCEPTED if refusal is None else _NOT_SET.get(refusal.ack, CommandResult.DENIED)
-            self._acknowledge(sender, messages.MAV_CMD_DO_SET_MISSION_CURRENT, result)
+            sender.command_ack(messages.MAV_CMD_DO_SET_MISSION_CURRENT, result)
 
         if resets == 1:
             ended(_NO_RESET)
@@ -225,10 +225,6 @@ class CommandService:
         switch = next((box for box in boxes if box in MISSION_BOXES), None)
         return None if switch is None else sentences.MISSION_SWITCH(switch)
 
-    def _acknowledge(self, sender: Sender, command: int, result: CommandResult) -> None:
-        ack = messages.MAVLink_command_ack_message(command, result, 0, 0, sender.sysid, sender.compid)
-        sender.to(ack)
-
     def _do(self, sender: Sender, command: int, params: Sequence[float], now: float) -> CommandResult:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE:
@@ -265,25 +261,25 @@ class CommandService:
         settings = self._settings
         if what != _SAVE:
             sender.say(sentences.ONLY_SAVED())
-            self._acknowledge(sender, command, CommandResult.DENIED)
+            sender.command_ack(command, CommandResult.DENIED)
         elif not settings.known.unsaved and (
             settings.known.is_saved or self._parameters.was_refused or settings.obstacle() is not None
         ):
-            self._acknowledge(sender, command, CommandResult.ACCEPTED)
+            sender.command_ack(command, CommandResult.ACCEPTED)
         elif not sender.station.allows(Cost.FLASH):
             sender.say(sentences.FLASH_WEAR())
-            self._acknowledge(sender, command, CommandResult.TEMPORARILY_REJECTED)
+            sender.command_ack(command, CommandResult.TEMPORARILY_REJECTED)
         else:
             settings.save(lambda result, _at: self._stored(sender, command, result), now)
 
     def _stored(self, sender: Sender, command: int, result: Answer) -> None:
         if not isinstance(result, SettingRefusal):
             sender.say(sentences.SETTINGS_SAVED())
-            self._acknowledge(sender, command, CommandResult.ACCEPTED)
+            sender.command_ack(command, CommandResult.ACCEPTED)
             return
         # Mission Planner sends it by itself.
         sender.say(result.why, is_routine=True)
-        self._acknowledge(sender, command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
+        sender.command_ack(command, _NOT_STORED.get(result.cause, CommandResult.DENIED))
 
     def _send_once(self, sender: Sender, msgid: int, now: float, index: int = 0) -> CommandResult:
         is_known = self._vehicle.send_once(sender, msgid, now, index)

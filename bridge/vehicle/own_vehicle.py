@@ -341,7 +341,7 @@ class OwnVehicle:
         for seq in filter(None, map(self._missions.seq_of, reached)):
             for sent_seqs, stations in self._by_item_numbers(everyone):
                 number = (sent_seqs[seq] or 0) if sent_seqs else seq
-                self._ground.outbox.multicast(pack(make.mission_item_reached(number)), stations)
+                self._ground.outbox.multicast(pack(messages.MAVLink_mission_item_reached_message(number)), stations)
 
     def _send_current(self, receivers: Sequence[GroundStation], now: float) -> None:
         if self._session.vehicle.armed and self._session.state.controller is None:

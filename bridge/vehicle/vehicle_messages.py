@@ -232,10 +232,6 @@ def mission_current(at: Moment) -> Message:
     return messages.MAVLink_mission_current_message(seq, total, mission.progress.value, 0)
 
 
-def mission_item_reached(seq: int) -> Message:
-    return messages.MAVLink_mission_item_reached_message(seq)
-
-
 def attitude(at: Moment) -> Message:
     """ATTITUDE: radians, radians a second."""
     now = at.need(v.Orientation)
@@ -398,10 +394,11 @@ def _battery(at: Moment) -> tuple[int, int, int]:
 
 def rc_channels(at: Moment) -> Message:
     """RC_CHANNELS: microseconds."""
-    channels = at.need(v.Sticks).channels_us
+    channels, signal = at.need(v.Sticks).channels_us, at.fresh(v.Signal)
     # As ArduPilot: Mission Planner would show UINT16_MAX, "unused", as a pulse width.
     fields = (*channels, *[0] * _CHANNELS)[:_CHANNELS]
-    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields, _rssi(at))
+    rssi = _UNKNOWN_U8 if signal is None else int(signal.strength * _MAX_RSSI)
+    return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields, rssi)
 
 
 def nav_controller_output(at: Moment) -> Message:
@@ -476,12 +473,6 @@ def home_position(at: Moment) -> Message:
     place = (home.lat_e7, home.lon_e7, altitude_mm)
     unknown_attitude, unknown_approach = [math.nan] * 4, (math.nan, math.nan, math.nan)
     return messages.MAVLink_home_position_message(*place, 0.0, 0.0, 0.0, unknown_attitude, *unknown_approach)
-
-
-def _rssi(at: Moment) -> int:
-    """0..254, or 255: unknown."""
-    signal = at.fresh(v.Signal)
-    return _UNKNOWN_U8 if signal is None else int(signal.strength * _MAX_RSSI)
 
 
 def _scaled_u16(value: float | None, parts: int) -> int:

@@ -165,10 +165,6 @@ def warn_once(known: set[str], event: str, /, **facts: object) -> None:
     level(event, **facts)
 
 
-def set_log_level(level: str) -> None:
-    _limits.level = level
-
-
 def recent_lines(after: int) -> tuple[int, list[LogLine]]:
     """The number of lines logged so far, and the latest of those after the first `after` lines."""
     count = min(max(_recent.count - after, 0), len(_recent.lines))
@@ -176,7 +172,7 @@ def recent_lines(after: int) -> tuple[int, list[LogLine]]:
 
 
 def set_up_logging(level: str) -> None:
-    set_log_level(level)
+    _limits.level = level
     output = _StandardError()
     logging.basicConfig(handlers=[_FromLibraries()], level=logging.WARNING, force=True)
     structlog.configure(
