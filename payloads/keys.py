@@ -25,14 +25,6 @@ class SampleDelivery(Enum):
     REPLY = "a reply to a query"
 
 
-class QueryKind(Enum):
-    """Queries of a kind share a limit. Guests send all but commands: a flood of theirs must not refuse a command."""
-
-    STATE = "answered from memory"
-    PAST = "answered from the disk"
-    COMMAND = "a command"
-
-
 @dataclass(frozen=True, slots=True)
 class ZenohKey:
     """One key. `schema`: file name below schemas/, without its suffix, or None if the payload is raw MAVLink.
@@ -50,10 +42,8 @@ class ZenohKey:
         return self.delivery is not SampleDelivery.REPLY and self is not MAVLINK_IN
 
     @property
-    def query_kind(self) -> QueryKind:
-        if self in COMMAND_KEYS:
-            return QueryKind.COMMAND
-        return QueryKind.PAST if self.delivery is SampleDelivery.REPLY else QueryKind.STATE
+    def is_command(self) -> bool:
+        return self in COMMAND_KEYS
 
 
 TELEMETRY = {group: ZenohKey(f"{_V}/telemetry/{group.value}", group.value, SampleDelivery.DROP) for group in Group}

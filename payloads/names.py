@@ -22,17 +22,8 @@ def host_name() -> str:
 
 def check_name(what: str, name: str) -> str:
     """The name; ZenohSettingsError, which begins with `what`, if it cannot be one chunk of a key."""
-    bad = _FORBIDDEN.search(name)
-    if not name:
-        wrong = "empty"
-    elif bad is not None:
-        wrong = f"{name!r}, with {bad.group()!r} in it"
-    elif plain_text(name) != name:
-        wrong = f"{name!a}, with characters that cannot be shown"
-    elif name.startswith("@"):
-        wrong = f"{name!r}, with @ in front"
-    elif len(name) > _MAX_NAME:
-        wrong = f"longer than {_MAX_NAME} characters"
-    else:
+    is_plain = name and plain_text(name) == name and not name.startswith("@")
+    if is_plain and len(name) <= _MAX_NAME and _FORBIDDEN.search(name) is None:
         return name
-    raise ZenohSettingsError(f'{what} is {wrong}: make a name of letters, digits and dashes, as "naze-1"')
+    remedy = f'at most {_MAX_NAME} letters, digits and dashes, as "naze-1"'
+    raise ZenohSettingsError(f"{what} is {name[:_MAX_NAME]!a}: make a name of {remedy}")

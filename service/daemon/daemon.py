@@ -26,14 +26,13 @@ from bridge.model.settings import TakenBackup
 from bridge.model.vehicle import GpsTime
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
-from service.daemon.fc_connection import FcConnection
+from service.daemon.fc_connection import FcConnection, Traffic
 from service.daemon.flight_file import FlightFile
 from service.daemon.last_settings import LastSettings
 from service.daemon.store_worker import StoreWorker
 from service.links.gcs_links import GcsLink, open_link
 from service.links.msp_share import open_share
 from service.links.signing_state import SigningState
-from service.links.traffic import Traffic
 from service.machine import event_loop
 from service.machine.host import Host
 from service.machine.log_setup import warn_once

@@ -6,6 +6,7 @@ import os
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, closing, suppress
+from dataclasses import dataclass
 from math import inf
 
 import serial
@@ -24,7 +25,6 @@ from service.links.fc_device import (
     send_last_frame,
 )
 from service.links.port_finder import PortFinder
-from service.links.traffic import Traffic
 from service.machine import event_loop
 from service.machine.host import Host
 from service.settings import Settings
@@ -53,6 +53,14 @@ _SHORTEST_DELAY_S, _LONGEST_DELAY_S = 0.002, 0.03
 _REPLIES_S = 0.25
 
 _log = structlog.get_logger()
+
+
+@dataclass(slots=True)
+class Traffic:
+    """Bytes through a port or link since the start."""
+
+    bytes_received: int = 0
+    bytes_sent: int = 0
 
 
 class FcPort:

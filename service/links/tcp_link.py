@@ -6,7 +6,7 @@ import socket
 from collections import Counter
 
 from bridge.gcs.station import Peer
-from protocols.mavlink.dialect import messages as m
+from protocols.mavlink.dialect import MESSAGE_FORMATS
 from protocols.mavlink.frame import MavlinkSplitter
 from service.links.gcs_events import GcsEvents
 from service.machine.log_setup import warn_once
@@ -25,28 +25,12 @@ _MAX_CLIENTS = 32
 #: Never dropped, because they are not sent again: a transfer, command or parameter would fail. Files and logs are
 #: not among them: they fill the buffer at once, and their reader asks again for missing parts.
 _KEPT = frozenset(
-    {
-        m.MAVLINK_MSG_ID_PARAM_VALUE,
-        m.MAVLINK_MSG_ID_PARAM_EXT_VALUE,
-        m.MAVLINK_MSG_ID_PARAM_EXT_ACK,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
-        m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
-        m.MAVLINK_MSG_ID_MISSION_ITEM,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
-        m.MAVLINK_MSG_ID_MISSION_COUNT,
-        m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-        m.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
-        m.MAVLINK_MSG_ID_MISSION_ACK,
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-        m.MAVLINK_MSG_ID_MISSION_ITEM_INT,
-        m.MAVLINK_MSG_ID_COMMAND_LONG,
-        m.MAVLINK_MSG_ID_COMMAND_INT,
-        m.MAVLINK_MSG_ID_COMMAND_ACK,
-        m.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-        m.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
-        m.MAVLINK_MSG_ID_STATUSTEXT,
-    }
+    msgid
+    for msgid, message in MESSAGE_FORMATS.items()
+    if message.name != "MISSION_CURRENT"
+    and message.name.startswith(
+        ("PARAM_", "MISSION_", "COMMAND_", "STATUSTEXT", "AUTOPILOT_VERSION", "MESSAGE_INTERVAL")
+    )
 )
 
 

@@ -22,14 +22,6 @@ class NameTaken(BridgeEvent):
     what: str = RENAME
 
 
-class NameFree(BridgeEvent):
-    """No other bridge has the vehicle name any longer."""
-
-    name_in_log = "zenoh.name_free"
-    vehicle: str
-    was: str
-
-
 class SessionJoined(BridgeEvent):
     """Another session is connected."""
 
@@ -85,7 +77,6 @@ class Liveliness:
             self._emit(NameTaken(vehicle=self._vehicle, by=peer_id))
         else:
             self.others.discard(peer_id)
-            self._emit(NameFree(vehicle=self._vehicle, was=peer_id))
 
     @property
     def is_alone(self) -> bool:

@@ -9,7 +9,7 @@ from functools import partial
 import structlog
 import zenoh
 
-from payloads.keys import UPLOAD, QueryKind, ZenohKey
+from payloads.keys import UPLOAD, ZenohKey
 from payloads.mission_data import Json, to_json
 from payloads.payload import Payloads, attachment_of, encoding_of
 from service.daemon.client import ControlError
@@ -18,8 +18,9 @@ from service.zenoh_link.session import JobKind, SessionThread
 from storage.os_error import reason
 from storage.store_error import StoreError
 
-#: Queries of each kind that are answered at once; more are refused. A command may hold a mission file.
-_MAX_AT_ONCE = {QueryKind.STATE: 16, QueryKind.PAST: 8, QueryKind.COMMAND: 16}
+#: Commands that are answered at once, and as many other queries; more are refused. A command may hold a mission file.
+#: Guests send the others: a flood of theirs must not refuse a command.
+_MAX_AT_ONCE = 16
 _STOPPED = "the daemon stopped before it could reply; after a restart mission/current shows what is on board"
 
 _log = structlog.get_logger()
@@ -41,7 +42,7 @@ class Question:
         self._key = key
         self._payloads = payloads
         self._thread = thread
-        self._reply_kind = JobKind.COMMAND_REPLY if key.query_kind is QueryKind.COMMAND else JobKind.REPLY
+        self._reply_kind = JobKind.COMMAND_REPLY if key.is_command else JobKind.REPLY
         self.name = name
 
     @property
@@ -86,18 +87,20 @@ class Queries:
         self._thread = thread
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
-        self._places = {kind: threading.Semaphore(most) for kind, most in _MAX_AT_ONCE.items()}
+        self._places = {is_command: threading.Semaphore(_MAX_AT_ONCE) for is_command in (False, True)}
 
     def declare(self, session: zenoh.Session, key: ZenohKey, name: str, answerer: Answerer) -> None:
         """Declare the queryable of one key. `name`: the full key. Called on the session's thread."""
-        places, most = self._places[key.query_kind], _MAX_AT_ONCE[key.query_kind]
+        places = self._places[key.is_command]
 
         def asked(query: zenoh.Query) -> None:
             question = Question(query, key, name, self._payloads, self._thread)
             if places.acquire(blocking=False):
                 post(self._loop, self._begin, question, answerer, places)
             else:
-                question.refuse(QueryRefused(f"{most} queries of this kind are being answered already: try again"))
+                question.refuse(
+                    QueryRefused(f"{_MAX_AT_ONCE} queries of this kind are being answered already: try again")
+                )
                 question.end()
 
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))

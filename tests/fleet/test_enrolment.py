@@ -132,7 +132,7 @@ def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:
     assert enrolled.enroll("kite").returncode == 0
     assert (enrolled.folder / "kite.json5").read_text() == before
     assert "kite is a vehicle already" in enrolled.enroll("kite", "--role", "pilot").stderr
-    assert "naze-bridge: the name is 'my plane', with ' ' in it" in enrolled.enroll("my plane").stderr
+    assert "naze-bridge: the name is 'my plane'" in enrolled.enroll("my plane").stderr
     assert "--prefix is 'a/b'" in enrolled.enroll("crow", "--prefix", "a/b").stderr
 
 

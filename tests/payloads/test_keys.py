@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The keys of a vehicle."""
 
-from payloads.keys import COMMAND_KEYS, COMMANDS, KEYS, MAVLINK_IN, QueryKind, full, vehicle_in
+from payloads.keys import COMMAND_KEYS, COMMANDS, KEYS, MAVLINK_IN, full, vehicle_in
 
 
 def test_no_two_keys_are_alike() -> None:
@@ -11,7 +11,7 @@ def test_no_two_keys_are_alike() -> None:
 def test_a_wildcard_over_telemetry_does_not_reach_a_command_or_mavlink() -> None:
     """zenoh's `**` matches no chunk that begins with @."""
     assert all(key.suffix.startswith("@") for key in (*COMMAND_KEYS, MAVLINK_IN))
-    assert {key for key in KEYS if key.query_kind is QueryKind.COMMAND} == set(COMMAND_KEYS)
+    assert {key for key in KEYS if key.is_command} == set(COMMAND_KEYS)
     assert {key for key in KEYS if key.suffix.startswith(COMMANDS)} == set(COMMAND_KEYS)
     assert not any(key.is_published for key in (*COMMAND_KEYS, MAVLINK_IN))
 

@@ -10,8 +10,7 @@ import pytest
 from bridge.effects import SendToBoard
 from bridge.fc.session import FcSession
 from service.daemon.daemon import Daemon
-from service.daemon.fc_connection import STOPPED, FcPort
-from service.links.traffic import Traffic
+from service.daemon.fc_connection import STOPPED, FcPort, Traffic
 from service.machine import event_loop
 from service.settings import Settings
 from service.settings.addresses import SimulatedFc

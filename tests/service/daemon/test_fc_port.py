@@ -17,9 +17,8 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkSplitter
-from service.daemon.fc_connection import FcPort
+from service.daemon.fc_connection import FcPort, Traffic
 from service.links.fc_device import device_opener, open_serial
-from service.links.traffic import Traffic
 from service.machine.event_loop import running
 from service.settings.addresses import SerialFc
 from tests.support.packing import pack

@@ -10,9 +10,8 @@ import termios
 
 import pytest
 
-from service.daemon.fc_connection import FcPort
+from service.daemon.fc_connection import FcPort, Traffic
 from service.links.fc_device import PortError, device_opener
-from service.links.traffic import Traffic
 from service.settings.addresses import TcpFc, parse_fc
 from tests.support.programs import TIMEOUT_S, free_port
 

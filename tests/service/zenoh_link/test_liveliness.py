@@ -46,4 +46,4 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
             assert "another bridge has the same vehicle name" in refused["error"]
         assert first.board.records() == before
         second.end(signal.SIGKILL)
-        until(lambda: first.daemon.has_logged("zenoh.name_free"), "the end of that")
+        reader.wait("state", lambda state: state["others_of_this_name"] == 0)
