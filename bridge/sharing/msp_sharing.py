@@ -71,14 +71,14 @@ class WaitingRequest:
 class Program:
     """A connected program. `name`: its address, `host`: the part of it without the port.
 
-    `send` carries a frame to it, `close` the connection, or None over UDP, which has none. `may_write`: it may change
-    something on the flight controller.
+    `send` carries a frame to it, `close` ends the connection. `may_write`: it may change something on the flight
+    controller.
     """
 
     name: str
     host: str
     send: Callable[[bytes], None]
-    close: Callable[[], None] | None
+    close: Callable[[], None]
     _: KW_ONLY
     may_write: bool
     waiting: list[WaitingRequest] = field(default_factory=list)
@@ -91,9 +91,6 @@ class Program:
         """Queue the requests in `data`. Returns False if all were dropped because of a flood."""
         if not self._budget.has(now):
             return False
-        if self.close is None:
-            # Complete requests only: the rest of a truncated request may be lost.
-            self._parser = MspParser(takes_low_v2=True)
         requests = [frame for frame in self._parser.feed(data[-_READ_SIZE:]) if frame.direction is Direction.REQUEST]
         self._budget.spend(len(requests))
         accepted = requests[: _MAX_WAITING - len(self.waiting)]
@@ -267,10 +264,9 @@ class MspSharing:
         level: Level = "warning" if is_reported else "debug"
         self._emit(ShareRefused(level=level, program=program.name, command=name, why=why))
         program.waiting.remove(request)
-        if program.close is not None:
-            self._programs.remove(program)
-            program.waiting.clear()
-            program.close()
+        self._programs.remove(program)
+        program.waiting.clear()
+        program.close()
         return name if is_reported else ""
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`[[share]]`: TCP and UDP ports on which other programs speak MSP through the bridge."""
+"""`[[share]]`: TCP ports on which other programs speak MSP through the bridge."""
 
 import asyncio
 from collections import Counter
 from collections.abc import Callable
-from typing import cast
 
 from bridge.bridge import Bridge
 from bridge.sharing.msp_sharing import Program
@@ -21,7 +20,7 @@ _MAX_PROGRAMS = 8
 
 
 async def open_share(share: ShareSettings, bridge: Bridge, flush: Callable[[], None]) -> Callable[[], None]:
-    """Listen, on tcpin or udpin; LinkError if that fails. Returns a function that closes the port and its connections.
+    """Listen; LinkError if that fails. Returns a function that closes the port and its connections.
 
     `flush` carries out the bridge's outputs.
     """
@@ -29,12 +28,8 @@ async def open_share(share: ShareSettings, bridge: Bridge, flush: Callable[[], N
     address = share.address
     where, family = (address.host, address.port), family_of(address.host)
     port = _SharePort(bridge, flush, may_write=share.write)
-    server: asyncio.BaseTransport | asyncio.Server
     try:
-        if address.kind == "udpin":
-            server, _ = await loop.create_datagram_endpoint(lambda: _UdpShare(port), local_addr=where, family=family)
-        else:
-            server = await loop.create_server(lambda: _TcpProgram(port), *where, family=family)
+        server = await loop.create_server(lambda: _TcpProgram(port), *where, family=family)
     except OSError as error:
         raise LinkError(f"share {address} cannot be opened: {reason(error)}") from error
 
@@ -59,7 +54,7 @@ class _SharePort:
         self,
         address: tuple[str, int],
         send: Callable[[bytes], None],
-        close: Callable[[], None] | None,
+        close: Callable[[], None],
         forget: Callable[[], None],
     ) -> Program:
         """A program has connected. `forget` drops it to make room for another."""
@@ -114,27 +109,3 @@ class _TcpProgram(asyncio.Protocol):
         self._transport.write(frame)
         if self._transport.get_write_buffer_size() > _MAX_UNSENT:
             self._transport.abort()
-
-
-class _UdpShare(asyncio.DatagramProtocol):
-    def __init__(self, port: _SharePort) -> None:
-        self._port = port
-        self._programs: dict[tuple[str, int], Program] = {}
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        # Before Python 3.12 the event loop's transport is not a subclass of it.
-        self._transport = cast("asyncio.DatagramTransport", transport)
-
-    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        if addr not in self._programs:
-            self._programs[addr] = self._port.join(
-                addr, lambda frame: self._send(frame, addr), None, lambda: self._forget(addr)
-            )
-        self._port.received(self._programs[addr], data)
-
-    def _forget(self, addr: tuple[str, int]) -> None:
-        del self._programs[addr]
-
-    def _send(self, frame: bytes, addr: tuple[str, int]) -> None:
-        if not self._transport.is_closing():
-            self._transport.sendto(frame, addr)

@@ -15,7 +15,6 @@ from service.settings.write_access import WriteAccess, parse_link
 from service.settings.zenoh import ZenohSettings
 
 DEFAULT_GCS = "udpin:0.0.0.0:14550"
-_SHARE_KINDS = ("tcpin", "udpin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +28,8 @@ class ShareSettings:
 def parse_share(entry: object, _folder: Path) -> ShareSettings:
     """Read one entry of `share`, or one [[share]] table. AddressError explains problems."""
     address, table = parse_table(entry, "share", "tcpin:127.0.0.1:5761", ["write"])
-    if address.kind not in _SHARE_KINDS:
-        raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT or udpin:ADDR:PORT")
+    if address.kind != "tcpin":
+        raise AddressError(f"share {address}: programs connect to it, so write tcpin:ADDR:PORT")
     write = table.get("write", False)
     if not isinstance(write, bool):
         raise AddressError(f"share {address}: write is {write!r}, but must be true or false")

@@ -11,18 +11,15 @@ _LONGEST_WAIT_S = 5.0
 
 
 class ShareProgram:
-    """A program on a TCP share, or over UDP. `replies`: with the time of their arrival."""
+    """A program on a share. `replies`: with the time of their arrival."""
 
-    def __init__(
-        self, world: World, name: str = "192.0.2.7:5000", *, may_write: bool = False, over_udp: bool = False
-    ) -> None:
+    def __init__(self, world: World, name: str = "192.0.2.7:5000", *, may_write: bool = False) -> None:
         self.world = world
         self.replies: list[tuple[float, MspFrame]] = []
         self.arrived = 0
         self.closed_at: float | None = None
         self._parser = MspParser(takes_low_v2=True)
-        close = None if over_udp else self._close
-        self.program = Program(name, name.partition(":")[0], self._arrived, close, may_write=may_write)
+        self.program = Program(name, name.partition(":")[0], self._arrived, self._close, may_write=may_write)
         world.bridge.program_joined(self.program)
 
     def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False) -> None:

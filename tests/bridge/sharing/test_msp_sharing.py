@@ -23,10 +23,10 @@ PAYLOADS = {DATAFLASH_READ: bytes(6)}
 NAME, SET_NAME, PID, SET_BOX, BOX = 10, 11, 112, 203, 113
 
 
-def ready(board: FakeInav, *, may_write: bool = False, over_udp: bool = False) -> tuple[World, ShareProgram]:
+def ready(board: FakeInav, *, may_write: bool = False) -> tuple[World, ShareProgram]:
     world = World(speeds=(115200,), peer=board)
     world.wait_ready(5)
-    return world, ShareProgram(world, may_write=may_write, over_udp=over_udp)
+    return world, ShareProgram(world, may_write=may_write)
 
 
 @pytest.mark.parametrize(("command", "size"), [(BOXNAMES, 700), (SERVO_MIXER, 500), (DATAFLASH_READ, LARGEST_REPLY)])
@@ -144,19 +144,9 @@ def test_forged_addresses_do_not_flood_the_stations_with_texts() -> None:
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     world.run(1)
     for host in range(200):
-        ShareProgram(world, f"198.51.100.{host}:1", over_udp=True).ask(SET_PID, bytes(30))
+        ShareProgram(world, f"198.51.100.{host}:1").ask(SET_PID, bytes(30))
         world.run(0.05)
     assert 1 <= sum("198.51.100." in text for text in station.texts()) <= 10
-
-
-def test_over_udp_a_refused_change_does_not_get_a_reply_and_the_rest_is_answered() -> None:
-    board = FakeInav()
-    board.answers = {**board.answers, SAFEHOME: b"\0home"}
-    _world, program = ready(board, over_udp=True)
-    program.ask(SET_PID, bytes(30))
-    assert program.wait_for(SAFEHOME, b"\0").command == SAFEHOME
-    assert [frame.command for _, frame in program.replies] == [SAFEHOME]
-    assert SET_PID not in board.commands
 
 
 def test_an_unknown_read_gets_the_reply_that_the_board_would_send() -> None:
@@ -238,7 +228,7 @@ def test_an_empty_setter_is_not_a_read(
     before = [ShareProgram(world).wait_for(command) for command in settings]
     for setter in setters:
         for command, payload in ((WP, poison), (setter, b"")):
-            ShareProgram(world, over_udp=True).ask(command, payload)
+            ShareProgram(world).ask(command, payload)
             world.run(1)
     after = [ShareProgram(world).wait_for(command) for command in settings]
     assert after == before

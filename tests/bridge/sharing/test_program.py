@@ -97,13 +97,13 @@ def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
     board.answers = {**board.answers, ATTITUDE: bytes(6)}
     world = World(speeds=(115200,), peer=board)
     world.wait_ready(5)
-    ShareProgram(world, "192.0.2.9:1", over_udp=True).ask_every(0.1, (ATTITUDE, b""))
+    ShareProgram(world, "192.0.2.9:1").ask_every(0.1, (ATTITUDE, b""))
     world.run(3)
     board.commands.clear()
     world.run(10)
     before = board.commands.count(ATTITUDE)
     for host in range(4):
-        ShareProgram(world, f"192.0.2.{host}:1", over_udp=True).ask_every(0.005, (PID, b""), (MISC, b""))
+        ShareProgram(world, f"192.0.2.{host}:1").ask_every(0.005, (PID, b""), (MISC, b""))
     world.run(3)
     board.commands.clear()
     world.run(10)
@@ -203,14 +203,14 @@ def test_a_program_that_waits_too_long_is_disconnected() -> None:
     items = load_mission(EXAMPLES / "long-146.waypoints")
     outcome = world.push(items)
     world.run(1)
-    program, over_udp = ShareProgram(world), ShareProgram(world, "192.0.2.9:1", over_udp=True)
+    program, other = ShareProgram(world), ShareProgram(world, "192.0.2.9:1")
     asked_at = world.now
     program.ask(PID)
-    over_udp.ask(PID)
+    other.ask(PID)
     world.run(4)
     assert outcome == []
     assert program.closed_at == pytest.approx(asked_at + 3, abs=0.3)
-    assert program.replies == over_udp.replies == []
+    assert program.replies == other.replies == []
     assert {event.facts["why"] for event in world.events("share.refused")} == {"a mission transfer is running"}
 
 

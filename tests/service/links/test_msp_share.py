@@ -155,32 +155,6 @@ async def test_a_mission_transfer_is_not_disturbed() -> None:
         assert inside(daemon.bridge).sharing.refused == {}
 
 
-async def test_over_udp_each_program_gets_its_own_replies() -> None:
-    loop = asyncio.get_running_loop()
-    port = free_port()
-
-    async def ask(program: socket.socket, request: bytes) -> MspFrame:
-        await loop.sock_sendto(program, request, ("127.0.0.1", port))
-        async with asyncio.timeout(TIMEOUT_S):
-            (reply,) = MspParser().feed(await loop.sock_recv(program, 4096))
-        return reply
-
-    question, pid, change = (
-        MspFrame(Direction.REQUEST, command, payload).encode()
-        for command, payload in ((IDENT, b""), (PID, b""), (SET_PID, bytes(30)))
-    )
-    async with sharing(f"udpin:127.0.0.1:{port}") as daemon:
-        with socket.socket(type=socket.SOCK_DGRAM) as first, socket.socket(type=socket.SOCK_DGRAM) as second:
-            for program in first, second:
-                program.setblocking(False)
-            await loop.sock_sendto(first, question[:-2], ("127.0.0.1", port))  # truncated, so it is dropped
-            await loop.sock_sendto(second, change, ("127.0.0.1", port))  # gets no reply
-            answered, other = await asyncio.gather(ask(first, question), ask(second, pid))
-    assert (answered.direction, answered.payload[0]) == (Direction.REPLY, 211)
-    assert (other.direction, other.command) == (Direction.REPLY, PID)
-    assert inside(daemon.bridge).sharing.refused.total() == 1
-
-
 async def test_a_further_client_displaces_the_silent_client(monkeypatch: pytest.MonkeyPatch) -> None:
     """A laptop that was switched off never closes its connection."""
     monkeypatch.setattr("service.links.msp_share._MAX_PROGRAMS", 2)
@@ -238,7 +212,7 @@ async def test_noise_is_not_passed_on() -> None:
     ("entry", "words"),
     [
         ("tcpin:5761", "is not a table with address"),
-        ({"address": "udpout:h:1"}, "write tcpin:ADDR:PORT or udpin:ADDR:PORT"),
+        ({"address": "udpout:h:1"}, "write tcpin:ADDR:PORT"),
         ({"address": "tcpin:5761", "writes": True}, "'writes' is not a setting of this table"),
         ({"address": "tcpin:5761", "write": "yes"}, "must be true or false"),
     ],
