@@ -31,7 +31,6 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     UPLOAD: a list that is announced, which costs log entries.
     BOARD: a request to the flight controller, which has a few hundred bytes a second to spare.
     PASSED: a frame for an autopilot that speaks MAVLink itself, over a slow line.
-    COPIED: a copy of a station's frame for another station, alongside such an autopilot.
     STORED: a list in the store that did not reach the flight controller.
     FLASH: a write to the flight controller's flash, whose pages endure 10,000 each: strangers would have to write for a
     month. A Harakiri with the mission extension has its own limit (docs/msp-mission.md).
@@ -57,7 +56,6 @@ class Cost(IntEnum):  # hashed for each datagram: as an int, in C
     UPLOAD = Rate(10, 50), Rate(10, 400)
     BOARD = Rate(4, 20), Rate(10, 40)
     PASSED = Rate(200, 600), Rate(200, 600)
-    COPIED = Rate(150, 300), Rate(150, 300)
     STORED = Rate(1 / 10, 20), Rate(1 / 5, 40)
     FLASH = Rate(1 / 600, 200), Rate(1 / 300, 400)
     RECORDED = Rate(50, 400), Rate(100, 800)

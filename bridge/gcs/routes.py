@@ -7,9 +7,7 @@ not heard yet go to the autopilot.
 """
 
 from collections.abc import Sequence
-from itertools import takewhile
 
-from bridge.gcs.budget import Cost
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from protocols.mavlink.codec import repack
@@ -64,7 +62,7 @@ class Routes:
         there = self._ground.everyone if system == 0 else self._stations_of(system, component)
         others = [other for other in there if other is not station]
         if to_stations:
-            self._ground.outbox.forward([frame.raw], takewhile(lambda _: station.allows(Cost.COPIED), others))
+            self._ground.outbox.forward([frame.raw], others)
         return system == 0 or self.addressed(system) is not None or not others
 
     def _stations_of(self, system: int, component: int) -> list[GroundStation]:

@@ -22,22 +22,6 @@ class NameTaken(BridgeEvent):
     what: str = RENAME
 
 
-class SessionJoined(BridgeEvent):
-    """Another session is connected."""
-
-    name_in_log = "zenoh.joined"
-    neighbour: str
-    kind: str
-
-
-class SessionLeft(BridgeEvent):
-    """The connection ended."""
-
-    name_in_log = "zenoh.left"
-    neighbour: str
-    kind: str
-
-
 class Liveliness:
     """Shows that the bridge is alive. `others`: sessions of other bridges with the same vehicle name."""
 
@@ -55,8 +39,8 @@ class Liveliness:
         self._own = str(session.zid())
 
         def joined(event: zenoh.TransportEvent) -> None:
-            peer_id, kind = str(event.transport.zid), str(event.transport.whatami)
-            post(self._loop, self._joined, peer_id, kind, event.kind == zenoh.SampleKind.PUT)
+            is_there = event.kind == zenoh.SampleKind.PUT
+            post(self._loop, self._neighbours.add if is_there else self._neighbours.discard, str(event.transport.zid))
 
         session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
         liveliness = session.liveliness()
@@ -88,7 +72,3 @@ class Liveliness:
             "zenoh_neighbours": len(self._neighbours),
             "zenoh_others_of_this_name": len(self.others),
         }
-
-    def _joined(self, peer_id: str, kind: str, is_there: bool) -> None:
-        (self._neighbours.add if is_there else self._neighbours.discard)(peer_id)
-        self._emit((SessionJoined if is_there else SessionLeft)(neighbour=peer_id, kind=kind))

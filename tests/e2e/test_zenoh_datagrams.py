@@ -41,7 +41,6 @@ def test_reports_are_recovered_on_a_link_that_loses_datagrams(start: Starter, tm
         bench.daemon.push(plain_plan(6))
         until(lambda: len(reports) >= 3, "all reports")
         assert [len(each["sent"]) for each in reports] == [4, 5, 6]
-        assert bench.daemon.has_logged("zenoh.left") is None
         del subscriber
 
 

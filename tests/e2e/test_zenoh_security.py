@@ -71,7 +71,7 @@ def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fle
     bench = secured_bench(start, fleet.config("vehicle", "naze-2"))
     with fleet.open("pilot", "pilot") as pilot:
         reader = Reader(pilot)
-        until(lambda: bench.daemon.has_logged("zenoh.joined"), "the daemon in the fleet")
+        until(lambda: (bench.daemon.status() or {}).get("zenoh_neighbours"), "the daemon in the fleet")
         planner = bench.mission_planner()
         planner.write(plain_plan(60))
         assert bench.board.records() == records_of(judge(plain_plan(60)))
