@@ -4,6 +4,7 @@
 import asyncio
 import socket
 from collections import Counter
+from math import inf
 
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import MESSAGE_FORMATS
@@ -72,7 +73,7 @@ class TcpLink:
             connections = Counter(peer.host for peer in self._clients)
             displaced, former = max(
                 self._clients.items(),
-                key=lambda each: (connections[each[0].host], not each[1].has_sent, -each[1].heard_at),
+                key=lambda each: (connections[each[0].host], -each[1].heard_at),
             )
             warn_once(
                 self._warned, "gcs.too_many_clients", link=self.name, displaced=str(displaced), limit=_MAX_CLIENTS
@@ -86,7 +87,7 @@ class TcpLink:
         return peer
 
     def received(self, peer: Peer, client: "_TcpClient", data: bytes) -> None:
-        client.heard_at, client.has_sent = self.loop.time(), True
+        client.heard_at = self.loop.time()
         self._events.gcs_data(peer, data, datagram=False)
 
     def left(self, peer: Peer, client: "_TcpClient") -> None:
@@ -97,14 +98,14 @@ class TcpLink:
 
 
 class _TcpClient(asyncio.BufferedProtocol):
-    """One connection. `heard_at`: when it last sent bytes, on the loop's clock; at first the time of the connection."""
+    """One connection. `heard_at`: when it last sent bytes, on the loop's clock, or minus infinity at first."""
 
     transport: asyncio.Transport
 
     def __init__(self, link: TcpLink) -> None:
         self._link = link
         self._buffer = bytearray(_READ_SIZE)
-        self.heard_at, self.has_sent = link.loop.time(), False
+        self.heard_at = -inf
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)

@@ -9,6 +9,7 @@ import asyncio
 import socket
 import struct
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -148,10 +149,8 @@ class UdpLink:
         """Open a socket for a station, on the address that it sends to, and close those of stations that have left."""
         for left in [each for each in self._own if not self._events.is_connected(each)]:
             self._own.pop(left).close()
-        try:
+        with suppress(OSError):  # it is served over the open socket
             self._own[peer] = _StationSocket(self._family, local, peer, self._loop, self._received)
-        except OSError as error:
-            warn_once(self._warned, "gcs.no_own_socket", peer=str(peer), why=reason(error))
 
     def _received(self, sender: Any, data: bytes) -> None:
         self._events.gcs_data(Peer(self.name, sender), data, datagram=True)

@@ -340,16 +340,6 @@ def test_mission_planner_goes_on_after_a_gap_in_the_wifi(gap_s: float, at_s: flo
     assert world.stored == records_of(items)
 
 
-def test_the_same_station_restarts_while_the_flight_controller_is_asked() -> None:
-    world, station = holding()
-    station.send(count_message(9))
-    world.run(0.0005)
-    assert state(world) is Asking
-    again = waypoints(12, 2)
-    assert Upload(station, again).run() is A.ACCEPTED
-    assert world.stored == records_of(again)
-
-
 @pytest.mark.parametrize("after_s", [0.001, 0.02, 0.1, 0.2])
 def test_the_same_station_restarts_while_the_list_is_written(after_s: float) -> None:
     world, station = holding()
@@ -467,16 +457,6 @@ def test_a_new_upload_ends_the_reminders() -> None:
     station.take()
     world.run(10)
     assert station.texts() == []
-
-
-def test_a_new_count_clears_the_previous_refusal() -> None:
-    world, station = holding()
-    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
-    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
-    station.take()
-    station.send(item_message(1, OLD[1]))
-    world.run(0.1)
-    assert acks(station) == []
 
 
 # While items arrive.

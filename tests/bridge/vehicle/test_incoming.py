@@ -256,19 +256,6 @@ def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
     assert [ack.type for ack in right.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
 
 
-def test_each_refused_attempt_is_answered_with_a_text() -> None:
-    """Its repetitions, and the requests for rates that a ground station sends by itself, get none."""
-    world = keyed()
-    station = GroundStation(world)
-    for attempt in range(1, 4):
-        station.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 30, 1e5, 0, 0, 0, 0, 0))
-        for _ in range(4):
-            station.send(clear_message())
-            world.run(0.7)
-        assert station.texts() == ["Refused: not signed"] * attempt
-        world.run(1)
-
-
 def test_a_refused_request_for_rates_does_not_get_a_text() -> None:
     """Every ground station sends some when it connects, and every radio its status."""
     world = keyed()
