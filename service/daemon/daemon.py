@@ -27,8 +27,7 @@ from bridge.model.vehicle import GpsTime
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
 from service.daemon.fc_connection import FcConnection, Traffic
-from service.daemon.flight_file import FlightFile
-from service.daemon.last_settings import LastSettings
+from service.daemon.kept_state import FlightFile, LastSettings
 from service.daemon.store_worker import StoreWorker
 from service.links.gcs_links import GcsLink, open_link
 from service.links.msp_share import open_share

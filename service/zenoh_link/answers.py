@@ -24,8 +24,8 @@ from protocols.param_file import ParamFile, read_param_file
 from protocols.plain_text import FileError
 from service.daemon.api import DaemonApi, delivery_data
 from service.daemon.telemetry_logs import TelemetryLogs
-from service.zenoh_link.liveliness import RENAME
 from service.zenoh_link.queries import Answerer, QueryRefused, Question
+from service.zenoh_link.session import RENAME
 
 #: Missions in a list, the newest.
 _LISTED = 50

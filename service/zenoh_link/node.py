@@ -36,11 +36,10 @@ from service.recording.tlog_recorder import TLOG_FOLDER
 from service.settings.zenoh import ZenohSettings
 from service.settings.zenoh_config import make_config
 from service.zenoh_link.answers import Answers, CommandQueries, mission_current, mission_report
-from service.zenoh_link.liveliness import Liveliness
 from service.zenoh_link.mavlink_link import MavlinkLink
 from service.zenoh_link.publisher import Publisher
 from service.zenoh_link.queries import Queries
-from service.zenoh_link.session import SessionThread, log_outages
+from service.zenoh_link.session import Liveliness, SessionThread, log_outages
 
 _STATE_INTERVAL_S, _OVERVIEW_INTERVAL_S = 1.0, 10.0
 _GROUPS = {key.suffix: group for group, key in keys.TELEMETRY.items()}

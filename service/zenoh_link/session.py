@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The zenoh session, and the thread for everything that may block: opening, closing, reliable samples.
+"""The zenoh session, the thread for everything that may block (opening, closing, reliable samples), and liveliness.
 
 zenoh connects and reconnects in its own threads. The event loop never waits for any of it.
 """
@@ -13,8 +13,10 @@ from enum import Enum
 import structlog
 import zenoh
 
+from bridge.model.events import BridgeEvent, Emit, Level
 from payloads.endpoints import in_short
-from service.machine.threads import BackgroundThread
+from payloads.mission_data import Json
+from service.machine.threads import BackgroundThread, post
 
 Job = Callable[[], None]
 #: The interval of diagnoses. zenoh tries again at least every 4 s.
@@ -35,6 +37,7 @@ class JobKind(Enum):
 _RETRY_S = 2.0
 #: A stalled receiver must not delay the daemon's end: then the session ends without closing.
 _CLOSE_TIMEOUT_S = 0.6
+RENAME = "give one of the two another zenoh.vehicle"
 
 _log = structlog.get_logger()
 
@@ -153,3 +156,65 @@ async def log_outages(diagnose: Callable[[], str], is_alone: Callable[[], bool])
                 _log.warning("zenoh.alone", why=found)
     finally:
         thread.close(0)
+
+
+class NameTaken(BridgeEvent):
+    """Another bridge has the same vehicle name."""
+
+    name_in_log = "zenoh.name_taken"
+    level: Level = "warning"
+    vehicle: str
+    by: str
+    what: str = RENAME
+
+
+class Liveliness:
+    """Shows that the bridge is alive. `others`: sessions of other bridges with the same vehicle name."""
+
+    def __init__(self, vehicle: str, emit: Emit) -> None:
+        self._vehicle = vehicle
+        self._emit = emit
+        self._loop = asyncio.get_running_loop()
+        self._own = ""
+        self._token: zenoh.LivelinessToken | None = None
+        self.others: set[str] = set()
+        self._neighbours: set[str] = set()
+
+    def declare(self, session: zenoh.Session, alive: str) -> None:
+        """Declare the token and find others. Called on the session's thread. `alive`: the tokens' key prefix."""
+        self._own = str(session.zid())
+
+        def joined(event: zenoh.TransportEvent) -> None:
+            is_there = event.kind == zenoh.SampleKind.PUT
+            post(self._loop, self._neighbours.add if is_there else self._neighbours.discard, str(event.transport.zid))
+
+        session.info.declare_transport_events_listener(zenoh.handlers.Callback(joined, indirect=False), history=True)
+        liveliness = session.liveliness()
+        # Must be kept: zenoh undeclares a token that is garbage-collected.
+        self._token = liveliness.declare_token(f"{alive}/{self._own}")
+
+        def seen(sample: zenoh.Sample) -> None:
+            is_there = sample.kind == zenoh.SampleKind.PUT
+            post(self._loop, self._seen, str(sample.key_expr).rpartition("/")[2], is_there)
+
+        liveliness.declare_subscriber(f"{alive}/*", zenoh.handlers.Callback(seen, indirect=False), history=True)
+
+    def _seen(self, peer_id: str, is_there: bool) -> None:
+        if peer_id == self._own or is_there == (peer_id in self.others):
+            return
+        if is_there:
+            self.others.add(peer_id)
+            self._emit(NameTaken(vehicle=self._vehicle, by=peer_id))
+        else:
+            self.others.discard(peer_id)
+
+    @property
+    def is_alone(self) -> bool:
+        return not self._neighbours
+
+    def status(self) -> Json:
+        return {
+            "zenoh": "open" if self._own else "not open",
+            "zenoh_neighbours": len(self._neighbours),
+            "zenoh_others_of_this_name": len(self.others),
+        }

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-import service.zenoh_link.liveliness  # noqa: F401 - it has events of its own
+import service.zenoh_link.session  # noqa: F401 - it has events of its own
 from bridge.model.events import BridgeEvent
 
 _REPOSITORY = Path(__file__).parents[2]

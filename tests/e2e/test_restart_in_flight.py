@@ -5,7 +5,7 @@ import time
 
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from service.daemon.flight_file import FLIGHT_FILE
+from service.daemon.kept_state import FLIGHT_FILE
 from tests.support.benches import Starter
 from tests.support.plain_station import PlainStation, udp_station
 from tests.support.programs import until

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bridge.model.craft import Airframe, FlightMemory, FlightMode, Home
-from service.daemon.flight_file import FLIGHT_FILE, FlightFile
+from service.daemon.kept_state import FLIGHT_FILE, FlightFile
 from service.machine.host import Host
 from tests.support.programs import until
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.model.settings import BoardId, Value
-from service.daemon.last_settings import SETTINGS_FILE, LastSettings
+from service.daemon.kept_state import SETTINGS_FILE, LastSettings
 
 NUMBERED, NAMELESS = BoardId("INAV 9.1.0", "0011"), BoardId("Harakiri 2.1.1")
 VALUES: dict[str, Value] = {"p_roll": 44, "snr_cf": 0.125, "name": "text"}
