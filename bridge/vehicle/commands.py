@@ -35,12 +35,6 @@ from protocols.rights import Effect
 
 _MAX_MSGID = (1 << 24) - 1
 
-#: Commands that only ask for a message: command number -> message number.
-_ASKS_FOR = {
-    messages.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    messages.MAV_CMD_GET_HOME_POSITION: messages.MAVLINK_MSG_ID_HOME_POSITION,
-}
-
 #: Commands that would act on the aircraft.
 _REFUSED: Mapping[int, Sentence[()]] = {
     messages.MAV_CMD_COMPONENT_ARM_DISARM: sentences.ARM,
@@ -229,6 +223,10 @@ class CommandService:
         match command:
             case messages.MAV_CMD_REQUEST_MESSAGE:
                 return self._send_once(sender, _msgid(params[0]), now, max(_msgid(params[1]), 0))
+            case messages.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
+                return self._send_once(sender, messages.MAVLINK_MSG_ID_AUTOPILOT_VERSION, now)
+            case messages.MAV_CMD_GET_HOME_POSITION:
+                return self._send_once(sender, messages.MAVLINK_MSG_ID_HOME_POSITION, now)
             case messages.MAV_CMD_SET_MESSAGE_INTERVAL:
                 return self._set_interval(sender, _msgid(params[0]), params[1])
             case messages.MAV_CMD_DO_SEND_BANNER:
@@ -246,8 +244,6 @@ class CommandService:
             case messages.MAV_CMD_DO_ACCEPT_MAG_CAL | messages.MAV_CMD_DO_CANCEL_MAG_CAL:
                 # It is stored already. QGroundControl asks by a cancel if there is such a calibration.
                 return CommandResult.ACCEPTED
-        if command in _ASKS_FOR:
-            return self._send_once(sender, _ASKS_FOR[command], now)
         if command in _REFUSED:
             self.refuse(sender, command, params)
             return CommandResult.DENIED
