@@ -12,16 +12,6 @@ from protocols.msp.frame import MspParser
 from tests.support.world import GroundStation, World, ready_world
 
 
-def test_texts_are_limited() -> None:
-    world = ready_world()
-    station = GroundStation(world)
-    banner = m.MAVLink_command_long_message(1, 1, 42428, 0, 0, 0, 0, 0, 0, 0, 0)
-    for number in range(1000):
-        world.after(number / 100, lambda: station.send(banner))
-    world.run(10)
-    assert 200 < len(station.texts()) <= 200 + 5 * 10 + 5
-
-
 def spent(budget: Budget, cost: Cost, now: float = 0.0, *, is_proven: bool = False) -> int:
     """The number of messages that it allows until it has refused a hundred."""
     allowed = refused = 0
