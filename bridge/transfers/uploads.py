@@ -177,7 +177,6 @@ class MissionUploads:
 
     def tick(self, now: float) -> None:
         """Repeat requests and answers, end states at their deadlines."""
-        self.due = inf
         for upload in [*self._uploads]:
             state = upload.state
             if now >= state.deadline:
