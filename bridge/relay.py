@@ -25,8 +25,8 @@ from bridge.model.events import BridgeEvent
 from bridge.model.missions import ARMED, ArrivedMission, Refusal
 from bridge.model.vehicle import FlightState, Source, Vehicle
 from bridge.transfers.downloads import MissionDownloads
-from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS, mission_handlers
-from bridge.transfers.uploads import MissionUploads
+from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS
+from bridge.transfers.uploads import MissionUploads, mission_handlers
 from bridge.voice import sentences
 from protocols.mavlink.codec import decode, repack
 from protocols.mavlink.dialect import messages as m

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The three types of lists of MAVLink's mission protocol: missions, fences and rally points. Sans-IO."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
 from bridge.gcs.ground import Ground
-from bridge.gcs.ground_station import Sender
 from bridge.gcs.station import Peer
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.mission_service import MissionService
@@ -14,9 +13,7 @@ from bridge.missions.place_lists import PlaceLists
 from bridge.model.events import Emit
 from bridge.model.missions import Refusal
 from bridge.transfers.downloads import MissionDownloads
-from bridge.transfers.uploads import MissionUploads
-from protocols.mavlink.codec import item_from_float_message, item_from_int_message
-from protocols.mavlink.dialect import Message
+from bridge.transfers.uploads import Handler, MissionUploads, mission_handlers
 from protocols.mavlink.dialect import messages as m
 
 READS = frozenset(
@@ -31,22 +28,6 @@ ENDS_DOWNLOAD = frozenset(
 )
 #: MISSION_ITEM.current of items outside a list: Mission Planner's "Fly to here" and "Change altitude".
 GUIDED = (2, 3)
-Handler = Callable[[Sender, Message, float], object]
-
-
-def mission_handlers(uploads: MissionUploads, downloads: MissionDownloads) -> Mapping[int, Handler]:
-    """The messages of mission transfers."""
-    return {
-        m.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
-        m.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: uploads.item(s, item_from_float_message(msg), now),
-        m.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: uploads.item(s, item_from_int_message(msg), now),
-        m.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
-        m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
-        m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
-        m.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
-        m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=True),
-    }
 
 
 class Transfers(NamedTuple):

@@ -5,7 +5,7 @@ Lists are received in parallel, and written one by one. Mission Planner loses so
 MISSION_COUNT as "continue". Most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -22,6 +22,7 @@ from bridge.missions.mission_service import DeliveryResult, MissionService, Miss
 from bridge.model.events import Emit, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import WholeList
+from bridge.transfers.downloads import MissionDownloads
 from bridge.transfers.upload_answers import UploadAnswers
 from bridge.transfers.upload_states import (
     TRANSITIONS,
@@ -46,11 +47,13 @@ from bridge.voice.happening import Happening
 from bridge.voice.mission_report import with_meant_home
 from bridge.voice.stations import Kind
 from protocols.float32 import is_single
-from protocols.mavlink.dialect import messages
+from protocols.mavlink.codec import item_from_float_message, item_from_int_message
+from protocols.mavlink.dialect import Message, messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from reports.finding import Finding
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
+Handler = Callable[[Sender, Message, float], object]
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
@@ -355,3 +358,20 @@ def _cancelled(why: Happening) -> Refusal:
 
 STOPPED = _cancelled(sentences.BRIDGE_STOPS())
 FC_LOST = Refusal(MissionResult.DENIED, sentences.LOST_DURING_UPLOAD())
+
+
+def mission_handlers(uploads: MissionUploads, downloads: MissionDownloads) -> Mapping[int, Handler]:
+    """The messages of mission transfers."""
+    return {
+        messages.MAVLINK_MSG_ID_MISSION_COUNT: lambda s, msg, now: uploads.count(s, msg.count, now),
+        messages.MAVLINK_MSG_ID_MISSION_ITEM: lambda s, msg, now: uploads.item(s, item_from_float_message(msg), now),
+        messages.MAVLINK_MSG_ID_MISSION_ITEM_INT: lambda s, msg, now: uploads.item(s, item_from_int_message(msg), now),
+        messages.MAVLINK_MSG_ID_MISSION_ACK: lambda s, msg, now: uploads.ack(s, msg.type, now),
+        messages.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: lambda s, msg, now: uploads.clear_all(s, msg.mission_type, now),
+        messages.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: lambda s, _, now: uploads.answers.partial_list(s, now),
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: lambda s, _, now: downloads.request_list(s, now),
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST: lambda s, msg, now: downloads.request(s, msg.seq, now, as_int=False),
+        messages.MAVLINK_MSG_ID_MISSION_REQUEST_INT: lambda s, msg, now: downloads.request(
+            s, msg.seq, now, as_int=True
+        ),
+    }

@@ -15,7 +15,8 @@ from bridge.gcs.station import Peer
 from bridge.missions.place_lists import NO_PLACES
 from bridge.model.events import Emit, GcsRefused
 from bridge.settings.parameters import Parameters
-from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS, Handler, Transfers
+from bridge.transfers.mission_types import ENDS_DOWNLOAD, GUIDED, READS, Transfers
+from bridge.transfers.uploads import Handler
 from bridge.vehicle.commands import CommandService
 from bridge.vehicle.own_vehicle import OwnVehicle
 from bridge.voice import sentences
