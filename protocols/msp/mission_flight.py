@@ -96,7 +96,6 @@ class FlightProgress:
     battery_low: bool = False
     record: int | None = None
     reached: int | None = None
-    count: int = 0
     distance: float = 0.0
     bearing: float = 0.0
     height_error: float = 0.0
@@ -118,7 +117,7 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
     """Read a reply. Returns None if it is truncated, an error, or of another version."""
     if len(payload) < _REPLY.size:
         return None
-    status, version, flags, state, reason, _, record, reached, count, *motion = _REPLY.unpack_from(payload)
+    status, version, flags, state, reason, _, record, reached, _, *motion = _REPLY.unpack_from(payload)
     distance, bearing, height_error, state_ms, compass = motion
     progress = None if status or version != _VERSION else _progress(state, reason, flags)
     if progress is None:
@@ -127,7 +126,6 @@ def decode_flight(payload: bytes) -> FlightProgress | None:
         progress,
         record=None if record == _NO_RECORD else record,
         reached=None if reached == _NO_RECORD else reached,
-        count=count,
         distance=distance / 100,
         bearing=bearing / 100,
         height_error=height_error / 100,

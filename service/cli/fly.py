@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`naze-bridge fly`: a mission file flown by a real firmware image in the simulated sky, and judged."""
 
-from enum import IntEnum
 from pathlib import Path
 
 import click
@@ -23,42 +22,23 @@ from terminal.files import assumed_home, load_mission, read_file, shown_path, wr
 from terminal.printing import print_json, print_table
 from terminal.sentences import fail, say
 
-
-class FlyStatus(IntEnum):
-    """The exit status."""
-
-    FLOWN = 0
-    NOT_FLOWN = 1
-    UNUSABLE = 2
+#: The exit status of wrong input.
+_UNUSABLE = 2
 
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option(
-    "--image", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware, unless there is a log."
-)
+@click.option("--image", type=PATH, help="The firmware, unless there is a log.")
 @click.option("--log", type=PATH, help="Judge the mission's real flight in this telemetry log instead.")
-@click.option(
-    "--flash",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="The board's flash (sim --flash) with your settings, which is not changed. Default: a prepared board.",
-)
+@click.option("--flash", type=PATH, help="The flash of your own board (sim --flash). Default: a prepared board.")
 @click.option("--wind", type=click.FloatRange(0, 20), default=0.0, help="Wind with gusts, m/s.")
 @click.option("--wind-from", type=click.FloatRange(0, 360), default=270.0, show_default=True, help="Its direction.")
 @click.option("--seed", type=int, default=0, help="Seed of gusts and noise.")
 @click.option("--mass", type=click.FloatRange(0.3, 4), default=1.0, show_default=True, help="The craft's weight, kg.")
-@click.option(
-    "--lie",
-    "lies",
-    metavar="NAME=VALUE",
-    multiple=True,
-    help=f"What is wrong with the craft: {', '.join(NAMES)}. May be repeated.",
-)
+@click.option("--lie", "lies", metavar="NAME=VALUE", multiple=True, help=f"A fault, repeatable: {', '.join(NAMES)}.")
 @click.option("--svg", type=PATH, help="Draw the track into this file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-@click.pass_context
 def fly(
-    ctx: click.Context,
     file: Path,
     image: Path | None,
     log: Path | None,
@@ -85,17 +65,17 @@ def fly(
         if log is not None:
             flight, title = logged_sortie(read_file(log, FileError), records), shown_path(log)
         elif image is None:
-            fail("give a firmware, --image FILE, or the telemetry log of a flight, --log FILE", FlyStatus.UNUSABLE)
+            fail("give a firmware, --image FILE, or the telemetry log of a flight, --log FILE", _UNUSABLE)
         else:
             weather = Weather(wind=wind, wind_from=wind_from, seed=seed)
             contents = read_file(flash, FileError) if flash else None
             progress = (lambda _: None) if as_json else say
             flight = fly_sortie(read_image(image), image.name, records, weather, mass, lies, contents, progress)
             title = f"{shown_path(file)}, wind {wind:g} m/s, seed {seed}"
-    except (SortieError, FileError) as error:
-        fail(error, FlyStatus.UNUSABLE)
-    except click.ClickException as error:
-        fail(error.message, FlyStatus.UNUSABLE)
+        if svg:
+            write_file(svg, flight.svg(title), FileError)
+    except (SortieError, FileError, click.ClickException) as error:
+        fail(error, _UNUSABLE)
     if as_json:
         print_json({"file": shown_path(file), **flight.to_json()})
     else:
@@ -106,12 +86,7 @@ def fly(
             table.add_row(*row)
         print_table(table)
         say(flight.summary())
-    if svg:
-        try:
-            write_file(svg, flight.svg(title), FileError)
-        except FileError as error:
-            fail(error, FlyStatus.UNUSABLE)
-    ctx.exit(FlyStatus.FLOWN if flight.is_flown else FlyStatus.NOT_FLOWN)
+    raise SystemExit(0 if flight.is_flown else 1)
 
 
 def _records(file: Path) -> tuple[WpRecord, ...]:
@@ -122,8 +97,8 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
         items = load_mission(file)
         verdict = check_list(items, rules(settings), assumed_home(items, shown_path(file)))
     except (MissionFileError, SettingsError) as error:
-        fail(error, FlyStatus.UNUSABLE)
+        fail(error, _UNUSABLE)
     if verdict.result is not Result.ACCEPTED:
         why = verdict.findings[-1].text() if verdict.findings else "empty"
-        fail(f"{shown_path(file)} is no mission to fly: {why}", FlyStatus.UNUSABLE)
+        fail(f"{shown_path(file)} is no mission to fly: {why}", _UNUSABLE)
     return verdict.records

@@ -70,4 +70,4 @@ def encode_flight(flight: FlightProgress) -> bytes:
     target = (round(flight.distance * 100), round(flight.bearing * 100), round(flight.height_error * 100))
     state_ms, compass = round(flight.state_s * 1000), round((flight.compass or 0) * 100)
     head = 0, _FLIGHT_VERSION, flight.summary >> 16 & 0xFF, flight.state, flight.reason, 0
-    return _FLIGHT.pack(*head, *records, flight.count, *target, state_ms, compass)
+    return _FLIGHT.pack(*head, *records, 0, *target, state_ms, compass)

@@ -33,7 +33,7 @@ def test_a_reply_is_read() -> None:
     assert progress.switch_on
     assert progress.in_command
     assert progress.battery_low
-    assert (progress.record, progress.reached, progress.count) == (4, 3, 9)
+    assert (progress.record, progress.reached) == (4, 3)
     assert (progress.distance, progress.bearing, progress.height_error, progress.state_s) == (12.5, 270, -1.5, 61.5)
     assert progress.compass == -28.3
 
