@@ -64,6 +64,8 @@ class Counters:
     refused_by_share: Mapping[str, int]
     firmware_version: tuple[int, int, int] | None
     settings: SettingsState | None
+    #: If it is wrong at the craft's place: degrees off, the setting, and the value that it needs.
+    declination: tuple[Any, ...] | None
 
 
 class TimedPart(Protocol):
@@ -282,6 +284,7 @@ class Bridge:
             refused_by_share=self._sharing.refused,
             firmware_version=self.vehicle.version,
             settings=self._board_settings.known.state,
+            declination=None if (wrong := self._compass_check.wrong) is None else wrong.values,
         )
 
     # Time.

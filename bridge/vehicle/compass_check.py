@@ -52,42 +52,40 @@ def declination_deg(lat_deg: float, lon_deg: float) -> float | None:
 
 
 class CompassCheck:
-    """Warns once, and each station that connects later, until the setting is right."""
+    """Warns once, and each station that connects later, until the setting is right. wrong: the present warning."""
 
     def __init__(self, vehicle: Vehicle, ground: Ground) -> None:
         self._vehicle = vehicle
         self._ground = ground
         #: The settings that were compared last: the declination is the same wherever one battery takes the craft.
         self._compared: SettingTable | None = None
-        self._told: Happening | None = None
+        self.wrong: Happening | None = None
 
     def follow(self, table: SettingTable) -> None:
         """Compare settings that have changed with the place just heard."""
-        if table is self._compared or self._vehicle.last(Health) is None:
+        place, health = self._vehicle.last(GlobalPosition), self._vehicle.last(Health)
+        if table is self._compared or place is None or health is None:
             return
         self._compared = table
-        if (problem := self._problem(table)) == self._told:
+        problem = _problem(table, place) if Sensor.COMPASS in health.sensors else None
+        if problem == self.wrong:
             return
         notices = self._ground.notices
-        if self._told in notices:
-            notices.remove(self._told)
-        self._told = problem
+        if self.wrong in notices:
+            notices.remove(self.wrong)
+        self.wrong = problem
         if problem is not None:
             self._ground.say(problem)
             notices.append(problem)
 
-    def _problem(self, table: SettingTable) -> Happening | None:
-        place, health = self._vehicle.last(GlobalPosition), self._vehicle.last(Health)
-        setting = table.find("mag_dec") or table.find("mag_declination")
-        automatic = table.find(_AUTOMATIC)
-        if place is None or health is None or Sensor.COMPASS not in health.sensors:
-            return None
-        here_deg = declination_deg(place.lat_e7 / 1e7, place.lon_e7 / 1e7)
-        if here_deg is None or setting is None or isinstance(setting.value, str) or (automatic and automatic.value):
-            return None
-        # 100 times the degrees, plus the minutes.
-        minutes, degrees = math.modf(setting.value / 100)
-        off_deg = abs(math.remainder(here_deg - degrees - minutes / 0.6, 360))
-        if off_deg < _REPORTED_DEG:
-            return None
-        return DECLINATION(round(off_deg), setting.name, 100 * round(here_deg))
+
+def _problem(table: SettingTable, place: GlobalPosition) -> Happening | None:
+    setting = table.find("mag_dec") or table.find("mag_declination")
+    automatic = table.find(_AUTOMATIC)
+    here_deg = declination_deg(place.lat_e7 / 1e7, place.lon_e7 / 1e7)
+    if here_deg is None or setting is None or isinstance(setting.value, str) or (automatic and automatic.value):
+        return None
+    # 100 times the degrees, plus the minutes.
+    minutes, degrees = math.modf(setting.value / 100)
+    off_deg = abs(math.remainder(here_deg - degrees - minutes / 0.6, 360))
+    return DECLINATION(round(off_deg), setting.name, 100 * round(here_deg)) if off_deg >= _REPORTED_DEG else None

@@ -44,6 +44,9 @@ def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tupl
         yield "Battery", battery + _age(facts["battery_age_s"])
         yield "Mission", _mission(facts)
         yield "Settings", _settings(facts)
+        if (wrong := facts["declination"]) is not None:
+            text = "{} deg off at this place: naze-bridge settings set {} {} && naze-bridge settings save"
+            yield "Compass", text.format(*wrong)
         if facts["round_trip_ms"] is not None:
             lost = f"{facts['requests_lost']} requests lost, {facts['bad_checksums']} bad checksums"
             yield "Serial line", f"round trip {facts['round_trip_ms']} ms, {lost}"

@@ -138,6 +138,7 @@ class DaemonApi:
             "mission_checksum": None if mission is None else mission.checksum,
             "mission_state": None if mission is None else mission.state,
             "mission_item": None if mission is None else mission.item,
+            "declination": counters.declination,
             "settings_seal": None if settings is None else str(settings.seal),
             "settings_changed": None if change is None else change.text,
             "settings_changed_s": None if change is None else round(self._loop.time() - change.at, 1),

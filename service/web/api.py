@@ -19,6 +19,7 @@ from starlette.routing import Route
 from bridge.settings.local_settings import by_parameter
 from payloads.comparison import shown, stored_mission
 from payloads.mission_data import ACCEPTED, Json, plain, to_json
+from payloads.settings_comparison import SettingValues
 from protocols.param_file import write_param_file
 from service.daemon.api import DaemonApi
 from service.daemon.client import ControlError
@@ -80,6 +81,7 @@ class Api:
             route("GET", "/api/settings/{number}", self._show_settings),
             route("GET", "/api/settings/{number}/file", self._settings_file),
             route("POST", "/api/settings/{number}/restore", self._restore_settings, check_token),
+            route("POST", "/api/declination", self._set_declination, check_token),
             *self._files.routes(),
             *self._pi.routes(),
         ]
@@ -88,7 +90,7 @@ class Api:
         """The current state, requested once a second by an open page."""
         daemon = self._daemon
         now = asyncio.get_running_loop().time()
-        transfer, refused = daemon.bridge.missions.transfer, daemon.bridge.counters().refused
+        transfer, counters = daemon.bridge.missions.transfer, daemon.bridge.counters()
         try:
             listed = (await self._api.list_missions(1))["missions"]
             newest = {key: listed[0][key] for key in ("number", "outcome")} if listed else None
@@ -102,12 +104,13 @@ class Api:
                 **asdict(daemon.report()),
                 "traffic": {name: asdict(traffic) for name, traffic in daemon.traffic.items()},
                 "port": {"address": daemon.fc.where, "trouble": daemon.fc.trouble},
-                "refused": [f"{count} x {why} ({link})" for (link, why), count in refused.items()],
+                "refused": [f"{count} x {why} ({link})" for (link, why), count in counters.refused.items()],
                 "recording": daemon.recording,
                 "newest_mission": newest,
                 "newest_backup": newest_backup,
                 "store_trouble": store,
                 "clock_trouble": daemon.clock_trouble,
+                "declination": counters.declination,
                 "lost_s": None if daemon.fc.lost_at is None else round(now - daemon.fc.lost_at, 1),
                 "transfer": None if transfer is None else asdict(transfer) | {"step": transfer.step.value},
                 "write": self._writer.state,
@@ -168,12 +171,20 @@ class Api:
 
     async def _restore_settings(self, request: Request) -> Response:
         backup = await self._find_settings(request)
+        return self._write_settings(f"settings {backup['number']}", backup["values"], backup["kind"])
 
+    async def _set_declination(self, _request: Request) -> Response:
+        if (wrong := self._daemon.bridge.counters().declination) is None:
+            raise ControlError("The declination is right, or not known yet.")
+        _, setting, needed = wrong
+        return self._write_settings(setting, {setting: needed}, "")
+
+    def _write_settings(self, what: str, values: SettingValues, kind: str) -> Response:
         async def write(progress: Progress) -> Json:
-            result = await self._api.settings.restore(backup["values"], backup["kind"], "status page", progress)
+            result = await self._api.settings.restore(values, kind, "status page", progress)
             return {"ack": ACCEPTED if result["is_saved"] else "", "text": result["text"]}
 
-        return self._writer.write(f"settings {backup['number']}", write, "settings")
+        return self._writer.write(what, write, "settings")
 
     async def _find_settings(self, request: Request) -> Json:
         return await self._api.settings.backup(whole(request.path_params["number"]))

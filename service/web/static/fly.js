@@ -3,10 +3,11 @@
 import { ask, postWithToken } from "./daemon.js";
 import { action, byId, make, resultPlace, setClass, setList, setText } from "./dom.js";
 import { STALE_S, age, evidence } from "./state_bar.js";
+import { writeForm } from "./write_form.js";
 
 const PAUSE_MS = 30000; // addresses change when a network comes up
 const known = (value, unit = "", digits = 0) => (value === null || value === undefined ? "–" : `${value.toFixed(digits)}${unit}`);
-let connectDue = 0, connectShown = "";
+let connectDue = 0, connectShown = "", declinationShown = "";
 
 export function showValues(state) {
   setText(byId("version"), state.version);
@@ -50,6 +51,17 @@ export function showValues(state) {
   list("ground", [...state.link.ground_stations, ...refused], "None connected.");
   setText(byId("recording"), state.recording.join("; ") || "Recording is off.");
   if (state.link.flight_controller === null) showEvidence(state);
+  showDeclination(state.declination);
+}
+
+// The result stays when the declination is right and its button gone.
+function showDeclination(wrong) {
+  const place = byId("declination"), [off, setting, needed] = wrong ?? [], label = `Set ${setting} to ${needed}`;
+  if (wrong && label !== declinationShown) {
+    declinationShown = label;
+    place.replaceChildren(make("p", { class: "bad" }, `The declination is ${off}° off at this place.`), writeForm(label, () => postWithToken("/api/declination")));
+  }
+  for (const part of place.querySelectorAll("p:first-child, button")) part.hidden = !wrong;
 }
 
 // The way to a first flight controller, and how far it is.

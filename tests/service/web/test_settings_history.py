@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings' history on the page: what changed, what a restore would change, and restoring with the token."""
+"""Settings on the page: what changed, what a restore would change, restoring, and the declination of the place."""
 
 from typing import Any
 
@@ -77,3 +77,41 @@ def test_a_backup_is_restored_from_the_page(browsers: Browsers, tuned: WebBench)
         tuned.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
         assert not page.find(f"{_FIRST} button.write").is_enabled()
+
+
+@pytest.fixture
+def misaligned(web: WebBench) -> WebBench:
+    """The simulated craft is where the declination is 3 degrees east."""
+    assert web.state()["declination"] is None
+    assert web.ask("/api/declination", "POST", Authorization=f"Bearer {web.token}").status == 404
+    command(web, "set", "mag_dec", "-2548")
+    until(lambda: web.state()["declination"], "the finding")
+    return web
+
+
+def test_a_wrong_declination_is_in_the_state_and_its_button_needs_the_token(misaligned: WebBench) -> None:
+    assert misaligned.state()["declination"] == [29, "mag_dec", 300]
+    assert misaligned.ask("/api/declination", "POST").status == 401
+    shown = run_naze_bridge("status", "--state-dir", misaligned.daemon.state_dir).stdout
+    assert "29 deg off at this place: naze-bridge settings set mag_dec 300 && naze-bridge settings save" in shown
+    assert misaligned.board is not None
+    misaligned.board.set("armed 1")
+    until(lambda: misaligned.state()["status"]["armed"], "the armed craft")
+    answer = misaligned.ask("/api/declination", "POST", Authorization=f"Bearer {misaligned.token}")
+    assert answer.status == 202
+    write = until(lambda: (now := misaligned.state()["write"])["done"] and now, "the refusal")
+    assert (write["ok"], write["text"][:5]) == (False, "Armed")
+    misaligned.board.set("armed 0")
+    until(lambda: misaligned.state()["status"]["armed"] is False, "the disarmed craft")
+    assert command(misaligned, "get", "mag_dec") == "-2548"
+
+
+def test_one_button_sets_and_saves_the_declination(browsers: Browsers, misaligned: WebBench) -> None:
+    with browsers.tab(misaligned.port, PHONE) as page:
+        page.open("fly", misaligned.token)
+        page.wait_text("#declination", "The declination is 29° off at this place.")
+        page.press("#declination button.write")
+        page.wait_text("#declination .result", "1 setting restored, saved and verified")
+        until(lambda: not page.find("#declination button").is_displayed(), "the end of the finding")
+        assert command(misaligned, "get", "mag_dec") == "300"
+        assert page.errors() == []
