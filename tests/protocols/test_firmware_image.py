@@ -8,9 +8,7 @@ import pytest
 
 from protocols.firmware_image import (
     FLASH_BASE,
-    FLASH_SIZE,
     PATCH_MARK,
-    PROGRAM_END,
     ImageError,
     check_patched,
     parse_image,
@@ -44,7 +42,7 @@ def test_hex_and_binary_files_have_the_same_program() -> None:
         ("x.hex", b""),
         ("x.bin", b""),
         ("x.bin", b"\xff" * 1000),
-        ("x.bin", PROGRAM + bytes(FLASH_SIZE)),
+        ("x.bin", PROGRAM + bytes(0x2_0000)),
     ],
 )
 def test_anything_else_is_refused_with_one_line(name: str, contents: bytes) -> None:
@@ -67,17 +65,17 @@ PATCHED = HARAKIRI + PATCH_MARK
         (struct.pack("<II", 0x2000_5000, FLASH_BASE + 0x1_0001) + PATCHED[8:], "does not begin with the vectors"),
         (PROGRAM + PATCH_MARK, "not a Harakiri"),
         (HARAKIRI, "without the mission patch"),
-        (PATCHED + bytes(PROGRAM_END), "too large"),
+        (PATCHED.ljust(0x1_D800 + 1, b"\0"), "too large"),
     ],
 )
 def test_only_a_patched_harakiri_may_be_flashed(program: bytes, why: str) -> None:
     with pytest.raises(ImageError, match=why):
         check_patched(program)
-    check_patched(PATCHED)
+    check_patched(PATCHED.ljust(0x1_D800, b"\0"))
 
 
 def test_the_patch_is_recognised_by_its_own_table_and_ends_where_the_sources_say() -> None:
     firmware = Path(__file__).parents[2] / "firmware"
     words = ", ".join(f"0x{word:08X}u" for word in struct.unpack("<4I", PATCH_MARK))
     assert words in (firmware / "naze_slots.c").read_text()
-    assert f"LINKED_BELOW 0x{FLASH_BASE + PROGRAM_END:08X}u" in (firmware / "harakiri_flash.c").read_text()
+    assert "LINKED_BELOW 0x0801D800u" in (firmware / "harakiri_flash.c").read_text()

@@ -8,7 +8,6 @@ from unittest.mock import Mock
 import pytest
 
 from bridge.controllers.harakiri.profile import PATCHED as HARAKIRI
-from protocols.firmware_image import FLASH_SIZE, PROGRAM_END
 from reports.vehicle_groups import Battery
 from service.daemon.client import ControlError, ask_daemon
 from service.daemon.firmware_api import FirmwareApi
@@ -24,9 +23,9 @@ PATCHED = stand_in(patched=True)
         ("flash-firmware", b"", "does not begin with the vectors"),
         ("flash-firmware", PATCHED[8:], "does not begin with the vectors"),
         ("flash-firmware", stand_in(patched=False), "without the mission patch"),
-        ("flash-firmware", PATCHED.ljust(PROGRAM_END + 1, b"\0"), "too large"),
-        ("restore-firmware", PATCHED, f"a backup has {FLASH_SIZE} bytes"),
-        ("restore-firmware", bytes(FLASH_SIZE), "does not begin with the vectors"),
+        ("flash-firmware", PATCHED.ljust(0x1_D800 + 1, b"\0"), "too large"),
+        ("restore-firmware", PATCHED, "a backup has 131072 bytes"),
+        ("restore-firmware", bytes(0x2_0000), "does not begin with the vectors"),
     ],
 )
 def test_a_wrong_image_is_refused_first(daemon: Daemon, what: str, image: bytes, why: str) -> None:
