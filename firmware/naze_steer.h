@@ -12,8 +12,9 @@
  *   air, which is what the accelerometer feels beyond the lean, and the integral of the error with `wind`, for a level that is
  *   off. There are two sets of these gains: st_careful until the compass error is known, then st_firm.
  *
- *   Margin, without any correction of the compass: st_careful flies to a place and stays there with a compass that is off by
- *   45 degrees, at a GPS lag of 0.2 to 0.5 s, with a craft of 0.5 to 2 kg; st_firm with 30 degrees. test_flight.c computes it.
+ *   Margin, without any correction of the compass, with a craft of 0.5 to 2 kg: st_careful holds a place and stops with a compass
+ *   that is off by 56 to 60 degrees at a GPS lag of 0.2 s, and by 46 to 50 at 0.5 s; st_firm with 49 to 52, and 36 to 41.
+ *   `make -C firmware margin` computes it.
  *
  * COMPASS
  *   The accelerometer's change of velocity is turned by the heading, the GPS's is not: the angle between the two is the

@@ -387,6 +387,8 @@ static const flight_t *flown;
 
 static void explain(void)
 {
+    if (!flown)
+        return;
     const nf_t *core = &flown->core;
     printf("  %.1f s: state %s before %s, reason %d, record %u, %.1f m to go; fix %d, stick %d, failsafe %d, rtl %d; true: %.1f m/s, lean %.0f, "
            "%.0f m north, %.0f m east, %.1f m high; compass %.0f, corrected %.0f, mass %.1f, wind %.1f m/s\n",
@@ -450,7 +452,7 @@ static void check_step(flight_t *flight)
     seen_states[core->state]++;
     seen_reasons[core->reason]++;
     CHECK(core->state < NF_STATES && core->reason < NF_REASONS && out->mode <= NF_LAND);
-    CHECK(reads <= NF_MAX_READS);
+    CHECK(reads <= 20);
     CHECK(!out->nose || (out->heading_cd >= 0 && out->heading_cd < 36000));
     CHECK(labs(out->climb_cm_s) <= settings.climb_cm_s);
     CHECK(out->mode == NF_PASS || (in->armed && in->switch_on));
@@ -468,7 +470,7 @@ static void check_step(flight_t *flight)
     if (core->state == NF_DESCENT || core->state == NF_SINK)
         CHECK(out->mode == NF_LAND);
     if (settings.fence_m && core->state >= NF_NEXT && core->state <= NF_STAY && craft.lies.jump_cm == 0 && craft.lies.drift_cm_s == 0)
-        CHECK(hypot(craft.at.n, craft.at.e) < (settings.fence_m + NF_OUTSIDE_M) * 100 + 600);
+        CHECK(hypot(craft.at.n, craft.at.e) < settings.fence_m * 100 + 1600);
     if (in->stick && !in->failsafe && before != NF_OFF)
         CHECK(core->state == NF_OFF || core->state == NF_HELD || core->state == NF_NO_FIX || core->state == NF_HOME);
     if (!in->fix)
@@ -600,7 +602,7 @@ static bool is_over(const flight_t *flight)
 /* One list in an undisturbed sky must be flown to its end. */
 static void fly_undisturbed(void)
 {
-    flight_t flight;
+    static flight_t flight;
     const bool takes_off = one_in(2);
     make_list(takes_off);
     const lies_t lies = random_lies();
@@ -626,7 +628,7 @@ static void fly_undisturbed(void)
 
 static void fly_disturbed(void)
 {
-    flight_t flight;
+    static flight_t flight;
     const uint32_t rate = (uint32_t)between(200, 6000);
     const bool takes_off = one_in(2);
     make_list(takes_off);
@@ -649,7 +651,7 @@ static void fly_disturbed(void)
 
 static nf_reason_t refusal(void (*spoil)(flight_t *flight))
 {
-    flight_t flight;
+    static flight_t flight;
     nf_record_t record;
     list.count = 0;
     record = random_record(WAYPOINT);
@@ -721,7 +723,7 @@ static void test_refusals(void)
 /* Only an edge of the switch while armed starts a flight; a flight that was left goes on at its record. */
 static void test_switch(void)
 {
-    flight_t flight;
+    static flight_t flight;
     nf_record_t record;
     list.count = 0;
     for (int i = 0; i < 5; i++) {
@@ -766,7 +768,7 @@ static void test_switch(void)
 /* A wind that the craft cannot fly against ends the leg, in a hold. */
 static void test_stall(void)
 {
-    flight_t flight;
+    static flight_t flight;
     nf_record_t record = random_record(WAYPOINT);
     list.count = 0;
     add(&record);
@@ -818,7 +820,7 @@ static void go_on(flight_t *flight, int seconds)
 /* A place that jumps for a moment has no effect; one that goes on ends the leg in a hold where the craft is. */
 static void test_jump(void)
 {
-    flight_t flight;
+    static flight_t flight;
     lies_t lies = honest;
     fly_north(&flight, &lies);
     craft.lies.jump_cm = 3000;
@@ -838,7 +840,7 @@ static void test_jump(void)
 /* Blown out of the cylinder, or lifted out of it: held. */
 static void test_fence(void)
 {
-    flight_t flight;
+    static flight_t flight;
     settings.fence_m = 90;
     fly_north(&flight, &honest);
     craft.at.e = 9000; /* farther than any wind takes it in a moment, so the fix has jumped, too */
@@ -859,7 +861,7 @@ static void test_fence(void)
 /* A low battery ends the mission if the pilot has set it: at home, or where the craft is. The pilot's stick has priority. */
 static void test_battery(void)
 {
-    flight_t flight;
+    static flight_t flight;
     settings.battery = NF_BATTERY_TOLD;
     fly_north(&flight, &honest);
     flight.in.battery_low = true;
@@ -896,13 +898,14 @@ static void test_battery(void)
     settings.battery = NF_BATTERY_TOLD;
 }
 
-/* The farthest from a place in the last half minute of two, m, or the fastest, m/s, with a compass that is off and not corrected. */
+/* The farthest from a place in the last half minute of two, m, or the fastest, m/s: steady wind, a compass that is off and not corrected. */
 static double stays_within(double mass, double lag_s, double compass, bool firm, st_mode_t mode)
 {
     st_t steer;
     nf_output_t out;
     lies_t lies = honest;
     double farthest = 0;
+    flown = NULL; /* only the steering */
     lies.mass = mass;
     lies.lag_s = lag_s;
     lies.compass = compass;
@@ -927,6 +930,7 @@ static double stays_within(double mass, double lag_s, double compass, bool firm,
         out.lean_cd = st_steer(&steer, &order);
         out.steer = ST_STAY;
         move_craft(&out);
+        craft.gust = (vector_t){0, 0};
         measure(&out);
         if (now_ms > 90000)
             farthest = fmax(farthest, (mode == ST_STAY ? hypot(craft.at.n - 300, craft.at.e) : hypot(craft.v.n, craft.v.e)) / 100);
@@ -934,23 +938,46 @@ static double stays_within(double mass, double lag_s, double compass, bool firm,
     return farthest;
 }
 
+/* The steering alone holds a place and stops, with a compass that is off by so many degrees to either side. */
+static bool is_stable(double mass, double lag_s, int degrees, bool firm)
+{
+    for (int side = -1; side <= 1; side += 2)
+        if (stays_within(mass, lag_s, side * degrees, firm, ST_STAY) >= 12 || stays_within(mass, lag_s, side * degrees, firm, ST_STOP) >= 2)
+            return false;
+    return true;
+}
+
 /* What naze_steer.h promises. */
 static void test_margin(void)
 {
     for (int mass = 1; mass <= 4; mass *= 2)
-        for (int lag = 2; lag <= 5; lag += 3)
-            for (int side = -1; side <= 1; side += 2) {
-                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false, ST_STAY) < 12);
-                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 30, true, ST_STAY) < 12);
-                CHECK(stays_within(mass / 2.0, lag / 10.0, side * 45, false, ST_STOP) < 2);
-            }
-    CHECK(stays_within(1, 0.2, 120, true, ST_STAY) > 12); /* the test can fail */
+        for (int lag = 2; lag <= 5; lag += 3) {
+            CHECK(is_stable(mass / 2.0, lag / 10.0, 45, false));
+            CHECK(is_stable(mass / 2.0, lag / 10.0, 30, true));
+        }
+    CHECK(!is_stable(1, 0.2, 120, true)); /* the test can fail */
+}
+
+static int margin(double mass, double lag_s, bool firm)
+{
+    int degrees = 0;
+    while (degrees < 90 && is_stable(mass, lag_s, degrees + 1, firm))
+        degrees++;
+    return degrees;
+}
+
+static void print_margins(void)
+{
+    printf("greatest compass error that is stable, degrees\n    kg   lag  careful  firm\n");
+    for (int mass = 1; mass <= 4; mass *= 2)
+        for (int lag = 2; lag <= 6; lag++)
+            printf("  %4.1f  %.1f s  %7d  %4d\n", mass / 2.0, lag / 10.0, margin(mass / 2.0, lag / 10.0, false), margin(mass / 2.0, lag / 10.0, true));
 }
 
 /* The way to a standstill from 8 m/s over ground, m: the hold of a flight that is switched on there, and then left alone. */
 static double stops_within(double mass, double wind_cm_s, double *farthest)
 {
-    flight_t flight;
+    static flight_t flight;
     lies_t lies = honest;
     nf_record_t record = random_record(WAYPOINT);
     lies.mass = mass;
@@ -991,6 +1018,47 @@ static void test_braking(void)
         }
 }
 
+/* How far a take-off in this wind drifts, the mean of ten, m. It is steered from 0.3 m on, and has to find the wind. */
+static double takeoff_drift(double mass, double wind_cm_s)
+{
+    double drifts = 0;
+    for (int i = 0; i < 10; i++) {
+        static flight_t flight;
+        lies_t lies = honest;
+        nf_record_t record = random_record(TAKEOFF);
+        double farthest = 0;
+        lies.mass = mass;
+        list.count = 0;
+        record.height_m = 10;
+        add(&record);
+        add(&record);
+        record.command = LOITER_UNLIM;
+        record.place = place_at(0, 0);
+        add(&record);
+        prepare_with(&flight, false, &lies);
+        craft.wind = (vector_t){wind_cm_s, 0};
+        craft.at = (vector_t){0, 0};
+        go_on(&flight, 1);
+        flight.in.switch_on = flight.toggled = true;
+        step(&flight);
+        flight.toggled = false;
+        for (int k = 0; k < 12000 / STEP_MS; k++) {
+            step(&flight);
+            farthest = fmax(farthest, hypot(craft.at.n, craft.at.e) / 100);
+        }
+        CHECK(craft.height > 500);
+        drifts += farthest;
+    }
+    return drifts / 10;
+}
+
+static void test_takeoff_drift(void)
+{
+    CHECK(takeoff_drift(1, 500) < 3);
+    CHECK(takeoff_drift(1, 800) < 4);
+    CHECK(takeoff_drift(0.5, 800) < 8);
+}
+
 /* Print the table of states, for the test that compares the manual. */
 static void print_states(void)
 {
@@ -1007,9 +1075,13 @@ int main(int argc, char **argv)
         print_states();
         return 0;
     }
+    chance_state = 88172645463325252u;
+    if (argc > 1 && !strcmp(argv[1], "--margin")) {
+        print_margins();
+        return 0;
+    }
     const unsigned long lists = argc > 1 ? strtoul(argv[1], NULL, 10) : 2000;
     const unsigned long first = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
-    chance_state = 88172645463325252u;
     test_refusals();
     test_switch();
     test_stall();
@@ -1018,6 +1090,7 @@ int main(int argc, char **argv)
     test_battery();
     test_margin();
     test_braking();
+    test_takeoff_drift();
     for (seed = first; seed < first + lists; seed++) {
         chance_state = seed * 0x9E3779B97F4A7C15u + 1;
         if (seed % 4)
