@@ -3,7 +3,6 @@
 
 import pytest
 
-from bridge.controllers.harakiri.profile import PATCHED, UNPATCHED
 from bridge.fc.states.msp import Cli
 from payloads.mission_data import Json
 from service.cli.doctor.flight_controller import check_flight_controller, check_running
@@ -38,11 +37,6 @@ def test_a_daemon_is_asked_and_the_port_not_touched() -> None:
     assert_ok(found, "Harakiri, MSP at 115200 baud, disarmed")
 
 
-def test_a_harakiri_without_the_patch_until_it_is_flashed() -> None:
-    assert_note(check_running(STATUS | {"flight_controller": UNPATCHED.name}), "no mission extension")
-    assert list(check_running(STATUS | {"flight_controller": PATCHED.name})) == []
-
-
 @pytest.mark.parametrize(
     ("damaged", "found_s", "is_bad"), [(5000, 3600.0, True), (9, 5.0, False), (12, 36000.0, False), (0, None, False)]
 )
@@ -54,16 +48,6 @@ def test_a_line_that_damages_replies(damaged: int, found_s: float | None, *, is_
         assert found == []
 
 
-def test_stations_without_the_key() -> None:
-    refused = [
-        "7 x not signed (udpin:0.0.0.0:14550)",
-        "1 x needs a key, or pass_through = everything (udpin:0.0.0.0:14550)",
-    ]
-    (found,) = check_running(STATUS | {"refused": refused})
-    assert_note(found, "7 requests on udpin:0.0.0.0:14550 were refused: not signed")
-    assert "setup --new-key" in found.remedy
-
-
 def test_a_board_behind_a_network_is_not_asked_about_wires() -> None:
     silent = STATUS | {"flight_controller": None, "state": "searching", "fc_bytes_received": 0}
     for fc in ("tcp:10.0.0.7:5760", "udp:10.0.0.7:14550"):
@@ -72,7 +56,3 @@ def test_a_board_behind_a_network_is_not_asked_about_wires() -> None:
         assert "TX" not in found.remedy
     (refused,) = check_flight_controller(parse_fc("tcp:10.0.0.7:5760"), None, no_answer)
     assert "TX" not in refused.remedy
-
-
-def test_a_store_that_cannot_write() -> None:
-    assert_problem(check_running(STATUS | {"store_trouble": "disk full"}), "disk full", "systemctl restart")

@@ -6,11 +6,8 @@ import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
-from types import SimpleNamespace
 
-import pytest
-
-from service.cli.doctor.machine import check_clock, check_database, check_disk, check_power
+from service.cli.doctor.machine import check_clock, check_database, check_power
 from storage.mission_store import open_store
 from tests.support.doctor import assert_note, assert_ok, assert_problem
 from tests.support.faulty_machine import FaultyMachine
@@ -25,26 +22,6 @@ def test_a_wrong_clock_is_a_problem(pi: FaultyMachine) -> None:
     assert_note(check_clock(pi, NOW), "not set by the network")
     pi.runs(12, "/usr/sbin/chronyd")
     assert_ok(check_clock(pi, NOW), "kept by chronyd")
-
-
-def test_a_nearly_full_disk_is_a_problem(tmp_path: Path) -> None:
-    state = tmp_path / "not made yet" / "state"
-    assert_ok(check_disk(state, lambda _: 1 << 30), "1024 MB free")
-    assert_problem(check_disk(state, lambda _: 10 << 20), "10 MB free", "remove unneeded files")
-
-
-def test_an_unusable_state_directory_is_a_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").touch()
-    assert_problem(check_disk(tmp_path / "file" / "state"), f"{tmp_path}/file is a file", "name another state_dir")
-    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    assert_note(check_disk(tmp_path), "no permission to write to")
-    monkeypatch.setattr(os, "statvfs", lambda _path: SimpleNamespace(f_flag=os.ST_RDONLY, f_blocks=1))
-    assert_problem(check_disk(tmp_path, lambda _: 1 << 30), "on a disk that is read-only", "remount,rw")
-
-
-def test_a_state_directory_where_no_files_are_kept(tmp_path: Path) -> None:
-    assert_problem(check_disk(Path("/proc/naze/state")), "/proc/naze/state cannot be made", "as state_dir")
 
 
 def test_a_damaged_store_is_a_problem(tmp_path: Path) -> None:

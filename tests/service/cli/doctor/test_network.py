@@ -4,7 +4,7 @@
 import os
 
 from service.cli.doctor.checked import Checked
-from service.cli.doctor.network import check_keys, check_ports, check_wifi
+from service.cli.doctor.network import check_keys, check_ports
 from service.settings import Settings
 from service.settings.addresses import parse_gcs
 from service.settings.settings import ShareSettings
@@ -17,18 +17,6 @@ UDP_14550 = "   1: 00000000:38D6 00000000:0000 07 00000000:00000000 00:00000000 
 
 
 TCP_14550 = "   1: 0100007F:38D6 0100007F:1F90 01 00000000:00000000 00:00000000 00000000  1000        0 4712 1 0 0\n"
-
-
-def test_a_wifi_without_address_or_switched_off_is_reported(pi: FaultyMachine) -> None:
-    pi.addresses.clear()
-    assert_note(check_wifi(pi, GCS), "wlan0 has no address")
-    pi.write("/sys/class/rfkill/rfkill0/type", "wlan\n")
-    pi.write("/sys/class/rfkill/rfkill0/soft", "1\n")
-    assert_problem(check_wifi(pi, GCS), "switched off (rfkill)", "sudo rfkill unblock wlan")
-    pi.write("/sys/class/rfkill/rfkill0/type", "bluetooth\n")
-    pi.path("/sys/class/net/wlan0/wireless/x").unlink()
-    pi.path("/sys/class/net/wlan0/wireless").rmdir()
-    assert_note(check_wifi(pi, GCS), "no Wi-Fi card")
 
 
 def ports(
@@ -50,11 +38,6 @@ def test_a_network_port_used_by_our_daemon_is_fine(pi: FaultyMachine) -> None:
     pi.sockets(udp=UDP_14550)
     pi.runs(55, "/usr/lib/naze-bridge/bin/python3", "-I", "/usr/bin/naze-bridge", "run", has_open="socket:[4711]")
     assert_ok(ports(pi, is_running=True), "the running daemon's")
-
-
-def test_a_running_daemon_without_the_port_is_a_problem(pi: FaultyMachine) -> None:
-    assert_ok(ports(pi), "UDP port 14550 is free")
-    assert_problem(ports(pi, is_running=True), "does not listen on UDP port 14550", "systemctl restart naze-bridge")
 
 
 def test_the_ports_of_the_page_and_of_shares_are_checked(pi: FaultyMachine) -> None:

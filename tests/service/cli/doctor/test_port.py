@@ -26,21 +26,6 @@ def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
 
 
-def test_setup_is_not_a_remedy_for_a_missing_uart_of_another_board(pi: FaultyMachine) -> None:
-    pi.write("/proc/device-tree/model", "Orange Pi 5\0")
-    found = check_port(pi, SerialFc("/dev/ttyS4", None))
-    assert_problem(found, "/dev/ttyS4 is missing", "enable this UART in the board's own boot settings")
-    assert "header" not in found.remedy
-
-
-def test_serial0_is_the_wrong_port_on_a_pi_5(pi: FaultyMachine) -> None:
-    pi.write("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0\0")
-    pi.write("/dev/ttyAMA10")
-    pi.path("/dev/serial0").unlink()
-    pi.path("/dev/serial0").symlink_to("ttyAMA10")
-    assert_problem(check_port(pi, PORT), "debug socket on a Raspberry Pi 5", "sudo naze-bridge setup --fc /dev/ttyAMA0")
-
-
 def test_without_a_named_port_every_port_is_checked(pi: FaultyMachine, tmp_path: Path) -> None:
     def checked() -> dict[str, Checked]:
         return {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), no_answer, lambda: STATUS)}
@@ -64,11 +49,6 @@ def test_without_a_named_port_the_daemons_own_is_checked(pi: FaultyMachine, tmp_
     searching = running | {"where": "the serial ports", "port": None, "ports_passed_over": []}
     found = {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), lambda: searching, no_answer)}
     assert_problem(found["port"], "there is no serial port", "plug the flight controller")
-
-
-def test_a_port_without_group_access_is_a_problem(pi: FaultyMachine) -> None:
-    pi.path("/dev/ttyAMA0").chmod(0o600)
-    assert_problem(check_permission(pi, PORT), "-rw-------", "sudo udevadm trigger --settle --subsystem-match=tty")
 
 
 def test_a_running_login_console_is_reported_once(pi: FaultyMachine) -> None:
@@ -112,11 +92,6 @@ def test_a_console_on_another_port_is_fine(pi: FaultyMachine) -> None:
     pi.runs(412, "/sbin/agetty", "ttyAMA10")
     pi.write("/proc/cmdline", "console=ttyAMA10,115200 console=tty1")
     assert_ok(check_console(pi, PORT), "no login console on /dev/ttyAMA0")
-
-
-def test_another_program_on_the_port_is_named(pi: FaultyMachine) -> None:
-    pi.runs(99, "/usr/bin/gpsd", "/dev/ttyAMA0", has_open="/dev/ttyAMA0")
-    assert_problem(check_holder(pi, PORT), "gpsd (pid 99) has /dev/ttyAMA0 open", "sudo kill 99")
 
 
 def test_a_daemon_on_the_port_is_fine_and_not_touched(pi: FaultyMachine, tmp_path: Path) -> None:
