@@ -21,6 +21,8 @@ _EXPIRY_S = 60.0
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
 MAX_STATIONS = 32
+#: A connected station, whether or not it transfers a mission, is never silent for this long.
+_STILL_S = 1.0
 #: The interval between searches for silent stations.
 _EXPIRY_INTERVAL_S = 1.0
 
@@ -227,6 +229,18 @@ class Ground:
         else:
             self.remove_default_peer(RECORDER)
         self.outbox.recorder = self.station(RECORDER)
+
+    def moved(self, sender: Sender, now: float) -> Sender:
+        """The sender at its new address if it is silent at the old one and unknown at the new one before, else itself.
+
+        A second station with the same ids was heard earlier or meanwhile. The new address has proven the same rights.
+        """
+        old, ids = sender.station, (sender.sysid, sender.compid)
+        for new in (*self._heard.values(), *self._unproven.values()) if now >= old.heard_at + _STILL_S else ():
+            is_same = new.peer.link == old.peer.link and new.standing is old.standing and new.return_path is None
+            if ids in new.senders and is_same and new is not old and new.came_at >= old.heard_at:
+                return new.senders[ids]
+        return sender
 
     # Messages to all stations.
 

@@ -256,7 +256,7 @@ class GroundStation:
         #: The highest MAVLink version that it has sent, and the version of replies: everything signed is MAVLink 2.
         self.version = 0
         self.frame_version = 2
-        self.heard_at = -inf
+        self.came_at = self.heard_at = -inf
         #: It is new, or has returned after a silence, perhaps restarted.
         self.is_back = False
         #: By sysid and compid.
@@ -315,7 +315,9 @@ class GroundStation:
     def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
         """Note a frame; returns the sender."""
         self.is_back = now >= self.heard_at + _RETURNS_S
-        self.is_heard, self.heard_at = True, now
+        if not self.is_heard:
+            self.is_heard, self.came_at = True, now
+        self.heard_at = now
         if self.version != 2:
             self.version = frame.version
             self.behaviour.speaks_v2 = self.version == 2

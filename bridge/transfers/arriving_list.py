@@ -129,6 +129,11 @@ class ArrivingList:
         self.request.asked(wanted, now)
         return wanted
 
+    def moved(self) -> None:
+        """The sender's address has changed: frames may have been lost."""
+        if self._one_until < inf:
+            self._one_until = -inf
+
     def take(self, item: MissionItem, sender: Sender, now: float) -> WholeList | int | None:
         """Keep an item of this list. The number of the item that is requested next, or None if none is."""
         seq, held = item.seq, self.items.get(item.seq)

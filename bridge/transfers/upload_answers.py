@@ -130,6 +130,10 @@ class UploadAnswers:
         else:
             sender.refuse(_NOT_WHOLE, self._mission_type)
 
+    def has_answered(self, sender: Sender, now: float) -> bool:
+        """True if an upload from this address has just ended."""
+        return self._last(sender, now) is not None
+
     def forget(self, sender: Sender) -> None:
         """The ground station has begun a new upload."""
         self._memory(sender).final_ack = None

@@ -65,6 +65,7 @@ class MissionUploads:
 
     def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions
+        self._ground = ground
         self._emit = emit
         #: In the order of their MISSION_COUNT.
         self._uploads: list[Upload] = []
@@ -185,6 +186,9 @@ class MissionUploads:
             if now >= state.deadline:
                 self._handle(upload, Ended(state.timeout), now)
             elif now >= state.due:
+                if state.received or isinstance(state, Delivering):
+                    # Without items, a station there may have started again, and would take it for its own list's.
+                    self._follow(upload, now)
                 self._request(upload, *state.repeats(now))
         self.answers.tick(now)
         self.due = min((upload.state.due for upload in self._uploads), default=inf)
@@ -323,7 +327,20 @@ class MissionUploads:
         for upload in reversed(self._uploads):
             if upload.sender == sender:
                 return upload
+        for upload in self._uploads:
+            self._follow(upload, sender.station.heard_at)
+            if upload.sender == sender:
+                return upload
         return None
+
+    def _follow(self, upload: Upload, now: float) -> None:
+        """A station whose address has changed goes on from there, unless it has begun another list there."""
+        there = self._ground.moved(upload.sender, now)
+        if there is upload.sender or self.answers.has_answered(there, now):
+            return
+        upload.sender = there
+        if isinstance(upload.state, Receiving):
+            upload.state.list.moved()
 
     def _answer(self, upload: Upload, ack: MissionResult, now: float) -> None:
         state = upload.state

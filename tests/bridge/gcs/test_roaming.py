@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station whose address changes (Wi-Fi roaming): same ids at a new address, silence at the old one."""
 
+import random
+
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
+from bridge.gcs.rights import LinkAccess
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, item_message, records_of, waypoints
@@ -42,15 +46,19 @@ class Roamer:
     def station(self) -> GroundStation:
         return self.present[0]
 
-    def move(self) -> GroundStation:
-        """Move to a new address."""
+    def move(self, upload: Upload | None = None, *, speaks: bool = True) -> GroundStation:
+        """Move to a new address; an upload continues there."""
         left = self.present[:]
         self._number += 1
         station = GroundStation(self.world, f"roams {self._number}", radio=WIFI)
         self.present[:] = [station]
         for former in left:
             former.on_message.clear()
-        send_heartbeats(station, self.present)
+        if upload is not None:
+            upload.station = station
+            station.on_message.append(upload._react)
+        if speaks:
+            send_heartbeats(station, self.present)
         self.world.run(0.03)
         return station
 
@@ -81,6 +89,71 @@ def test_two_stations_with_the_same_ids_stay_separate() -> None:
     assert world.events("gcs.silent") == []
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_an_upload_continues_from_a_new_address(seed: int) -> None:
+    """Moving once or twice at any moment, also after the last item and while the list is written."""
+    chance = random.Random(seed)
+    world = ready_world()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN)
+    for _ in range(chance.choice((1, 1, 2))):
+        world.run(chance.random() * 2)
+        if not upload.is_over:
+            roamer.move(upload, speaks=chance.random() < 0.5)
+    assert upload.run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_requests_follow_a_station_that_only_sends_items() -> None:
+    world = ready_world()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN, repeat_s=100)
+    world.wait_until(lambda _: len(upload.requested) > 20, 5)
+    roamer.move(upload)
+    assert upload.run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_an_upload_restarted_from_a_new_address_replaces_the_old_upload() -> None:
+    for count in (40, 30):
+        world = ready_world()
+        roamer = Roamer(world)
+        old = Upload(roamer.station, PLAN)
+        world.wait_until(lambda _, old=old: len(old.requested) > 20, 5)  # type: ignore[misc]
+        old.stop()
+        roamer.move()
+        world.run(1.5)
+        plan = waypoints(count, seed=7)
+        assert Upload(roamer.station, plan).run() is MissionResult.ACCEPTED
+        assert world.stored == records_of(plan)
+
+
+def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list() -> None:
+    """Its item 0 would complete the previous list of one item, and its own list would get that list's refusal."""
+    world = ready_world()
+    roamer = Roamer(world)
+    former = Upload(roamer.station, PLAN[:1])
+    former.stop()
+    world.run(1.5)
+    roamer.move()
+    world.run(3)
+    assert roamer.station.messages("MISSION_REQUEST") == []
+    assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
+    assert world.stored == records_of(PLAN)
+
+
+def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
+    world = ready_world()
+    roamer = Roamer(world)
+    upload = Upload(roamer.station, PLAN)
+    world.wait_until(lambda _: len(upload.requested) > 20, 5)
+    upload.stop()
+    new = roamer.move()
+    world.run(8)
+    assert [message.type for message in new.messages("MISSION_ACK")] == [MissionResult.OPERATION_CANCELLED]
+    assert Upload(new, PLAN).run() is MissionResult.ACCEPTED
+
+
 def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
     """It was known before, or the first one is still active: its items are ignored."""
     world = ready_world()
@@ -97,6 +170,25 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
         assert intruder.messages("MISSION_ACK", "MISSION_REQUEST") == []
     assert upload.run() is MissionResult.ACCEPTED
     assert world.stored == records_of(PLAN)
+
+
+def test_an_address_that_may_not_write_does_not_take_over_an_upload() -> None:
+    """The first one is silent, and items come from an address that its link's rule does not allow."""
+    allowed = LinkAccess(may_write=lambda peer: peer.key != "forged")
+    world = World(speeds=(115200,), links={"udp": allowed})
+    world.wait_ready()
+    first = GroundStation(world, "first", radio=WIFI)
+    upload = Upload(first, PLAN)
+    world.wait_until(lambda _: len(upload.requested) > 10, 5)
+    upload.stop()
+    forged = GroundStation(world, "forged")
+    for _ in range(3):
+        world.run(0.6)
+        for seq, item in enumerate(PLAN):
+            forged.send(item_message(seq, item))
+    world.run(5)
+    assert forged.messages("MISSION_REQUEST") == []
+    assert world.stored == ()
 
 
 def test_a_download_continues_from_a_new_address() -> None:
