@@ -50,6 +50,8 @@ TELEMETRY = (
     Row(m.MAVLINK_MSG_ID_BATTERY_STATUS, v.Power, 0.5, EXTRA3, make.battery_status),
     Row(m.MAVLINK_MSG_ID_RC_CHANNELS, v.Sticks, 0.5, RC_CHANNELS, make.rc_channels),
     Row(m.MAVLINK_MSG_ID_HOME_POSITION, v.GlobalPosition, inf, NO_STREAM, make.home_position),
+    Row(m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, v.Orientation, inf, NO_STREAM, make.attitude_quaternion),
+    Row(m.MAVLINK_MSG_ID_LOCAL_POSITION_NED, v.GlobalPosition, inf, POSITION, make.local_position_ned),
     Row(m.MAVLINK_MSG_ID_MISSION_CURRENT, None, 1.0, EXTENDED_STATUS, make.mission_current),
     Row(m.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, None, 1.0, EXTENDED_STATUS, make.nav_controller_output),
     Row(m.MAVLINK_MSG_ID_SYSTEM_TIME, None, 1.0, EXTRA3, make.system_time),

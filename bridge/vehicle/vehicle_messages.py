@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 from bridge.fc.mavlink_telemetry import SENSORS
 from bridge.model import vehicle as v
 from bridge.model.craft import Airframe, FlightMode, Home
-from bridge.model.ground_track import bearing_deg, distance_m
+from bridge.model.ground_track import bearing_deg, distance_m, north_east_m
 from bridge.model.missions import FlownMission, Way
 from bridge.vehicle.readiness import ReadyState
 from protocols.mavlink.codec import pack_attitude
@@ -399,6 +399,36 @@ def rc_channels(at: Moment) -> Message:
     fields = (*channels, *[0] * _CHANNELS)[:_CHANNELS]
     rssi = _UNKNOWN_U8 if signal is None else int(signal.strength * _MAX_RSSI)
     return messages.MAVLink_rc_channels_message(at.boot_ms, len(channels), *fields, rssi)
+
+
+def attitude_quaternion(at: Moment) -> Message:
+    """ATTITUDE_QUATERNION: w, x, y, z."""
+    now = at.need(v.Orientation)
+    halves = [math.radians(angle) / 2 for angle in (now.roll_deg, now.pitch_deg, now.heading_deg)]
+    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = map(math.sin, halves), map(math.cos, halves)
+    return messages.MAVLink_attitude_quaternion_message(
+        at.boot_ms,
+        cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
+        sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
+        cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
+        cos_r * cos_p * sin_y - sin_r * sin_p * cos_y,
+        *_UNKNOWN_RATES,
+    )
+
+
+def local_position_ned(at: Moment) -> Message:
+    """LOCAL_POSITION_NED: metres from home, m/s."""
+    position, height = at.need(v.GlobalPosition), at.need(v.Height)
+    north, east = north_east_m(known(at.vehicle.home), position)
+    return messages.MAVLink_local_position_ned_message(
+        at.boot_ms,
+        north,
+        east,
+        -height.height_m,
+        known(position.north_m_s),
+        known(position.east_m_s),
+        -height.climb_m_s,
+    )
 
 
 def nav_controller_output(at: Moment) -> Message:

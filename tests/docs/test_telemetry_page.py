@@ -43,4 +43,5 @@ def test_each_field_is_on_the_page(row: Row) -> None:
     for field in m.mavlink_map[row.msgid].fieldnames:
         known = re.sub(r"^chan\d+_raw$", "chan1", field.removesuffix("_extended"))
         known = re.sub(r"^errors_count\d$", "errors_count1", known)
+        known = re.sub(r"^q\d$", "q1", known) if row.msgid == m.MAVLINK_MSG_ID_ATTITUDE_QUATERNION else known
         assert known in UNTOLD or known in lines, f"{name_of(row)}.{field}"

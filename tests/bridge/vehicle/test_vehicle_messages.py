@@ -420,3 +420,22 @@ def test_height_and_speed_determine_the_landed_state(
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(flags=flags), RAW_GPS=gps(speed=speed))
     with_replies(state, HARAKIRI, ALTITUDE=struct.pack("<ih", height_cm, climb_cms))
     assert make.extended_sys_state(at(state)).landed_state == landed
+
+
+def test_local_position_is_reported() -> None:
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), RAW_GPS=gps(speed=0))
+    with_replies(state, HARAKIRI, STATUS=status(flags=1 << 5), ALTITUDE=struct.pack("<ih", 1500, 20))
+    with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 1797, more=struct.pack("<H", 0)))
+    local = make.local_position_ned(at(state))
+    assert (local.x, local.y, local.z) == (pytest.approx(20, abs=0.1), pytest.approx(0, abs=0.1), -15)
+    assert (local.vx, local.vy, local.vz) == (pytest.approx(2.5), pytest.approx(0), pytest.approx(-0.2))
+
+
+@pytest.mark.parametrize(("roll", "pitch", "yaw"), [(0, 0, 0), (30, 0, 0), (0, -20, 0), (10, 20, 170), (-5, 3, -90)])
+def test_the_quaternion_is_the_same_attitude(roll: int, pitch: int, yaw: int) -> None:
+    state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ATTITUDE=attitude(roll * 10, -pitch * 10, yaw))
+    sent = make.attitude_quaternion(at(state))
+    w, x, y, z = sent.q1, sent.q2, sent.q3, sent.q4
+    assert math.degrees(math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))) == pytest.approx(roll)
+    assert math.degrees(math.asin(2 * (w * y - z * x))) == pytest.approx(pitch)
+    assert math.degrees(math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))) == pytest.approx(yaw)
