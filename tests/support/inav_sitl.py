@@ -121,6 +121,13 @@ class Sitl:
         self._process.terminate()
         self._process.wait(5)
 
+    def line(self) -> str:
+        """Disconnect from it. Returns the line for a daemon."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+        return f"tcp:127.0.0.1:{self._port}"
+
     def _connect(self) -> None:
         deadline = time.monotonic() + 60
         while True:

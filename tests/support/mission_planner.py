@@ -335,7 +335,9 @@ class MissionPlanner:
             if result is MissionResult.INVALID_SEQUENCE:
                 at = self._requested_seq(at) - 1
             elif result is not MissionResult.ACCEPTED:
-                raise UploadFailed(f"Upload {_TABS[self.tab]} failed {result.name}", result)
+                error = UploadFailed(f"Upload {_TABS[self.tab]} failed {result.name}", result)
+                error.add_note(f"The vehicle's last texts: {self.texts[-5:]}")
+                raise error
             at += 1
         self._send_ack()
 
