@@ -24,6 +24,7 @@ _STANDARD_OUTPUT = Path("-")
 _BOARD = "board"
 _NO_BOARD: Json = {"settings": []}
 _DUMP = ".txt"
+_MODE = "MODE_"
 #: Their settings have the names of the board's command line.
 _WITH_DUMPS = ("INAV", "Harakiri")
 
@@ -55,6 +56,26 @@ def _print_settings(held: Json) -> None:
         table.add_row(each["name"], *map(Text, row))
     print_table(table)
     click.echo(f"\n{len(held['settings'])} settings of {held['board']}")
+
+
+@settings.command()
+@bridge_options
+def modes(client: BridgeClient) -> None:
+    """List the modes with the channels and the pulses in us that turn them on. Change one with `settings set`."""
+    held = _held(client)
+    rows = [each for each in held["settings"] if each["name"].startswith(_MODE)]
+    if not rows:
+        fail(f"{held['board']} has boxes instead of mode ranges: see its settings in `settings list`")
+    client.show({"modes": rows}, lambda: _print_modes(rows))
+
+
+def _print_modes(rows: list[Json]) -> None:
+    table = Table("Mode", "Channel", "From", "To", box=None, pad_edge=False)
+    for each in rows:
+        for held in each["shown"].split("; "):
+            channel, _, pulses = held.partition(" ")
+            table.add_row(Text(each["name"]), channel, *pulses.split("-"))
+    print_table(table)
 
 
 @settings.command("get")

@@ -64,6 +64,20 @@ def test_an_unsettable_name_is_reported_in_one_sentence(tuned: Daemon) -> None:
     assert len(history(tuned)) == 1
 
 
+def test_modes_are_listed_with_channel_and_pulses(start: Starter) -> None:
+    inav = start.bench("--kind", "inav").daemon
+    until(lambda: history(inav), "the first backup")
+    assert settings(inav, "set", "MODE_ANGLE", "AUX1 1300-1700; AUX2 900-1200").returncode == 0
+    rows = [line.split() for line in settings(inav, "modes").stdout.splitlines()]
+    assert rows[0] == ["Mode", "Channel", "From", "To"]
+    ranges = [["MODE_ANGLE", "AUX1", "1300", "1700"], ["MODE_ANGLE", "AUX2", "900", "1200"]]
+    assert [row for row in rows if row[0] == "MODE_ANGLE"] == ranges
+
+
+def test_a_board_without_mode_ranges_says_so(tuned: Daemon) -> None:
+    assert_one_sentence(settings(tuned, "modes"), 1, "has boxes instead of mode ranges")
+
+
 def test_a_file_is_backed_up_compared_and_restored(tuned: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "before.param"
     assert settings(tuned, "backup", file).returncode == 0
