@@ -26,6 +26,7 @@ NOT_RUN = {
     "naze-bridge fleet list": "needs a router: tests/fleet/test_command.py runs it",
     "naze-bridge fleet watch": "needs a router: tests/fleet/test_roll_call.py runs it",
     "naze-bridge fleet push": "needs a router: tests/fleet/test_push.py runs it",
+    "naze-bridge settings modes": "needs an INAV: tests/service/cli/test_settings_commands.py",
     "naze-bridge settings get MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",
     "naze-bridge settings set MODE_ANGLE": "needs an INAV: tests/bridge/controllers/test_msp_parts.py",
     "naze-bridge fleet settings": "needs a router: tests/fleet/test_settings_command.py runs it",
