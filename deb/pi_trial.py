@@ -270,7 +270,9 @@ def survives(pi: Pi, plug: Plug, pulls: int) -> None:
 _UPDATE = """
 set -e
 mkdir -p /var/lib/naze-bridge-helper
-cp /root/{}.deb /var/lib/naze-bridge-helper/installing.deb
+cp /root/{}.deb /var/lib/naze-bridge-helper/new.deb
+sync
+mv /var/lib/naze-bridge-helper/new.deb /var/lib/naze-bridge-helper/installing.deb
 dpkg --force-confold --install /var/lib/naze-bridge-helper/installing.deb
 rm /var/lib/naze-bridge-helper/installing.deb
 """

@@ -32,8 +32,6 @@ _MAX_REQUEST = 64 << 10
 _PIECE = 1 << 16
 _ELSEWHERE = "The Pi can be changed only from its own network: its hotspot, or the network that it has joined."
 _NOT_NEXT = "This piece does not follow the one before, or the package is too long: begin again."
-_ARMED = "The craft is armed: disarm it first."
-_FLASHING = "New firmware is being flashed: wait until it has finished."
 _log = structlog.get_logger()
 
 
@@ -139,10 +137,9 @@ class PiControl:
     def _check_changeable(self) -> None:
         # A craft that was lost while armed may still fly.
         if self._daemon.report().last_heard.armed:
-            raise HTTPException(HTTPStatus.CONFLICT, _ARMED)
-        # A restart would interrupt flashing.
+            raise HTTPException(HTTPStatus.CONFLICT, "The craft is armed: disarm it first.")
         if self._daemon.fc.is_lent:
-            raise HTTPException(HTTPStatus.CONFLICT, _FLASHING)
+            raise HTTPException(HTTPStatus.CONFLICT, "New firmware is being flashed: wait until it has finished.")
 
 
 def _pieces(file: IO[bytes]) -> Iterator[bytes]:

@@ -7,6 +7,7 @@ That process first packs the installed files again, so that it can go back, and 
 bridge does not run with the new package: `python -m service.cli.helper.packages FILE`.
 """
 
+import os
 import shutil
 import sys
 import time
@@ -125,7 +126,9 @@ def update_outcome(host: Host) -> str:
 def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
     """Install the package. If the bridge does not run with it, return to the previous. Returns the outcome."""
     was_running = _answers()
-    # Moved first, because it may be the previous. naze-bridge-finish-update.service does it after a power cut.
+    # Moved first: it may be the previous. naze-bridge-finish-update.service installs it after a power cut, so it
+    # must be on the disk: dpkg takes zeros for the end of a package.
+    os.sync()
     installing, kept = package.rename(host.path(f"{_FOLDER}/installing.deb")), host.path(PREVIOUS)
     version, former = version_of(installing, machine), pack_installed(kept, host, machine)
     outcome = f"Version {version} was installed; before it was {former}."
@@ -165,6 +168,7 @@ def pack_installed(package: Path, host: Host, machine: Machine) -> str | None:
     # Fast rather than small: a Pi Zero would compress for minutes.
     packed = package.with_suffix(".new")
     machine.run(("dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build", str(root), str(packed)), _TIMEOUT_S)
+    os.sync()
     packed.replace(package)
     shutil.rmtree(root)
     return version_of(package, machine)
