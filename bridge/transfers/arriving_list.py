@@ -19,6 +19,8 @@ _MAX_TIMEOUT_S = 0.75
 #: then. Later repeats are rarer: Mission Planner gives up after ten that it received.
 _OFTEN_S = 1.5
 _SELDOM_S = 0.7
+#: A sender of this many items that were not requested begins each list with item 0.
+_UNREQUESTED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +74,11 @@ class ItemRequest:
             self._round_trip_s = max(self._late[1], self._round_trip_s or 0.0)
         return self._unanswered[seq] >= 0
 
-    def answered(self, seq: int, now: float) -> None:
-        """Update the timeout when an item arrives for the first time since it was requested."""
-        self._unanswered[seq] -= 1
+    def answered(self, seq: int, now: float) -> bool:
+        """Update the timeout when an item arrives for the first time since it was requested; False if it was not."""
+        missing = self._unanswered[seq] = self._unanswered.get(seq, 0) - 1
         if seq != self.seq:
-            return
+            return missing >= 0
         known_s, elapsed_s = self._round_trip_s, now - self._first_at
         if self.is_repeated:
             # Either copy may have been lost.
@@ -84,6 +86,7 @@ class ItemRequest:
             self._round_trip_s = now - self._asked_at if known_s is None else known_s
         else:
             self._round_trip_s = elapsed_s if known_s is None else known_s * 7 / 8 + elapsed_s / 8
+        return True
 
 
 class ArrivingList:
@@ -92,7 +95,7 @@ class ArrivingList:
     If one of the sender's frames was lost since the first item, that may have been the MISSION_COUNT of another list:
     most stations answer the request for an item of the previous list with one of their new list. So all items are
     requested a second time before the last, and after it if a frame was lost just before it. Not from Mission Planner:
-    such requests cost most of its ten tries, and it begins each list with item 0.
+    such requests cost most of its ten tries, and it begins each list with item 0, as its unrequested items show.
     """
 
     def __init__(self, count: int, check: ListCheck, now: float) -> None:
@@ -107,6 +110,8 @@ class ArrivingList:
         self._one_until = 0.0
         #: Items 0.._compared-1 were the same the second time, or None if they are not requested again.
         self._compared: int | None = None
+        #: Items that arrived unrequested: in bursts ("Write Fast"), or instead of those requested again ("Write").
+        self._unrequested = 0
 
     @property
     def received(self) -> tuple[MissionItem, ...]:
@@ -140,10 +145,12 @@ class ArrivingList:
         if not self.items:
             self._one_until = sender.frames
         if held is None or seq == self.request.seq:
-            self.request.answered(seq, now)
+            self._unrequested += not self.request.answered(seq, now)
             self.progress_at = now
         elif sender.is_copy or self.request.explains_repeat(seq):
             return None
+        elif self._compared == 0:
+            self._unrequested += 1
         if held is None:
             self.items[seq] = item
             while self._judged in self.items:
@@ -165,9 +172,9 @@ class ArrivingList:
 
     def _compare(self, sender: Sender) -> None:
         """Begin or end the second reading."""
-        if sender.station.behaviour.kind is Kind.MISSION_PLANNER:
+        if sender.station.behaviour.kind is Kind.MISSION_PLANNER or self._unrequested >= _UNREQUESTED:
             self._compared, self._one_until = None, inf
         elif self._compared is None:
-            self._compared = 0
+            self._compared = self._unrequested = 0
         elif self._compared == self._judged:
             self._compared, self._one_until = None, sender.frames
