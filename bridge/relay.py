@@ -173,12 +173,12 @@ class _RemoteMissions(MissionService):
         self.is_local = False
         self.results: list[WriteResult] = []
 
-    def refusal(self) -> Refusal | None:
+    def armed_refusal(self) -> Refusal | None:
         return ARMED if self.vehicle.armed else None
 
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         yield from ()
-        return self.refusal() or StoreReport(StoreState.READY, _AnyRules(), None)
+        return self.armed_refusal() or StoreReport(StoreState.READY, _AnyRules(), None)
 
     def deliver(
         self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True

@@ -109,6 +109,7 @@ NO_LINK = Refusal(MissionResult.DENIED, sentences.NO_LINK())
 _BUSY = Refusal(MissionResult.DENIED, sentences.BUSY())
 STOPPING = Refusal(MissionResult.DENIED, sentences.STOPPING())
 _UNKNOWN = Refusal(MissionResult.DENIED, sentences.ARMED_AND_UNKNOWN())
+OCCUPIED = Refusal(MissionResult.DENIED, sentences.OCCUPIED())
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ class MissionEnded:
 
 
 class MissionService:
-    """Holds the current flight controller's mission store, and the list."""
+    """Holds the transfer lock, the current flight controller's mission store, and the list."""
 
     #: MAV_MISSION_TYPE of the lists.
     mission_type: int = 0
@@ -133,6 +134,7 @@ class MissionService:
         self._do = do
         #: The mission store of the current flight controller, or the reply to every attempt.
         self.fc_store: AnyFcMissionStore | Refusal = NO_LINK
+        self._owner: object | None = None
         self._closed = False
         self._flies_mission = False
         #: False until the current flight controller's list was read, and after an interrupted push.
@@ -228,20 +230,35 @@ class MissionService:
         why = self.fc_store.why_stopped(place)
         return why and f"{'Returns' if is_return else 'Holds'}: {why}"
 
-    def refusal(self) -> Refusal | None:
-        """The reason that no list can be written now, if it is known without asking the board."""
+    def occupied(self) -> Refusal | None:
+        """The reason that no list can be written now, if there is one."""
         if self._closed:
             return STOPPING
+        return None if self._owner is None else OCCUPIED
+
+    def acquire(self, owner: object) -> Refusal | None:
+        """Take the transfer lock. A refusal if another client has it."""
+        if (refusal := self.occupied()) is None:
+            self._owner = owner
+        return refusal
+
+    def armed_refusal(self) -> Refusal | None:
+        """The refusal if the craft is known to be armed. Saves a request to a busy board."""
         return ARMED if not isinstance(self.fc_store, Refusal) and self.vehicle.armed else None
 
     def close(self) -> None:
         """Accept no more transfers: the bridge is stopping."""
         self._closed = True
 
+    def release(self, owner: object) -> None:
+        """A transfer has ended, whether or not it had the lock."""
+        if self._owner is owner:
+            self._owner = None
+
     def preflight(self) -> Conversation[StoreReport | Refusal]:
         """Ask the flight controller if it can take a list now."""
-        if (refusal := self.refusal()) is not None:
-            return refusal
+        if (armed := self.armed_refusal()) is not None:
+            return armed
         waited_s = 0.0
         while True:
             if isinstance(self.fc_store, Refusal):
@@ -275,7 +292,7 @@ class MissionService:
         """
         if is_kept:
             yield BeginSave(Save(arrived))
-        fc_store, verdict = self.refusal() or self.fc_store, arrived.verdict
+        fc_store, verdict = self.fc_store, arrived.verdict
         identity, before = identify(verdict.records), None if self.held is None else self.held.identity
         outcome: Outcome | None = Outcome.FAILED
         change: Callable[[str], Happening] | None = None

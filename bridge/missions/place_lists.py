@@ -39,7 +39,7 @@ class PlaceLists(MissionService):
     def deliver(
         self, arrived: ArrivedMission, progress: PushProgress = lambda _records: None, *, is_kept: bool = True
     ) -> Conversation[DeliveryResult]:
-        verdict, fc_store = arrived.verdict, self.refusal() or self.fc_store
+        verdict, fc_store = arrived.verdict, self.fc_store
         if verdict.result is Result.REJECTED:
             return DeliveryResult(verdict.ack, sentences.REJECTED(verdict.findings[-1].text()), None)
         if isinstance(fc_store, Refusal):

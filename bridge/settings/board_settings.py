@@ -97,7 +97,7 @@ class BoardSettings:
             return ARMED
         if self._fc_settings is None:
             return _NO_BOARD
-        if self._missions.writing is not None or self._missions.is_arriving:
+        if self._missions.occupied() is not None or self._missions.is_arriving:
             return _OCCUPIED
         return None if armed is False else _UNREAD
 
@@ -135,7 +135,7 @@ class BoardSettings:
 
     def current(self, on_done: OnTable, now: float, within_s: float) -> None:
         """The table, checked against the board if that is possible within this time, else as last read."""
-        if self._fc_settings is None or self._session.vehicle.armed or self._missions.writing is not None:
+        if self._fc_settings is None or self._session.vehicle.armed or self._missions.occupied() is not None:
             on_done(self._as_last_read(), now)
             return
         self._readers.append((now + within_s, on_done))

@@ -205,6 +205,8 @@ class MspSharing:
             request = _first_unknown(program.waiting)
             if request is None or (request.frame.payload and link.owes(request.frame.command)):
                 continue
+            if request.is_change and self._missions.occupied() is not None:
+                continue
             self._programs.remove(program)
             self._programs.append(program)
             self._forward(program, request, controller, now)

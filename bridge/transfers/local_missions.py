@@ -59,6 +59,7 @@ class LocalMissions:
         `may_erase` False: a list without a storable item is refused.
         """
         source = plain_text(source)
+        owner = object()
         arrived: list[ArrivedMission] = []
 
         def conversation() -> Conversation[DeliveryResult | Refusal]:
@@ -72,6 +73,7 @@ class LocalMissions:
             return (yield from self._missions.deliver(arrived[0], on_progress))
 
         def done(result: DeliveryResult | Refusal, _at: float) -> None:
+            self._missions.release(owner)
             if arrived and isinstance(result, DeliveryResult):
                 is_lossy = result.ack is MissionResult.ACCEPTED and result.why.severity.is_on_hud
                 pushed = sentences.PUSHED_WITH_LOSSES if is_lossy else sentences.PUSHED
@@ -88,7 +90,11 @@ class LocalMissions:
             on_done(result, arrived[0] if arrived else None)
 
         self._emit(PushStarted(source=source, count=len(items)))
-        self._missions.run(conversation(), done, now)
+        refusal = self._missions.acquire(owner)
+        if refusal is None:
+            self._missions.run(conversation(), done, now)
+        else:
+            done(refusal, now)
 
     def pull(self, on_done: Callable[[HeldMission | Refusal], None], now: float) -> None:
         self._missions.run(self._missions.shown(), lambda held, _at: on_done(held), now)

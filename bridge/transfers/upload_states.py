@@ -8,8 +8,9 @@ from math import inf
 
 from bridge.gcs.ground_station import Sender
 from bridge.missions.list_check import ListCheck
+from bridge.missions.mission_service import OCCUPIED
 from bridge.model.missions import Refusal
-from bridge.transfers.arriving_list import ArrivingList
+from bridge.transfers.arriving_list import ArrivingList, WholeList
 from bridge.voice import sentences
 from protocols.mission_item import MissionItem, MissionResult
 
@@ -22,6 +23,10 @@ class Event:
     """An event that changes an upload's state."""
 
 
+class Turn(Event):
+    """No other transfer delays this one."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ready(Event):
     """The flight controller can take the list."""
@@ -29,8 +34,15 @@ class Ready(Event):
     check: ListCheck
 
 
+class SenderFinished(Event):
+    """The ground station considers the list written: "Write Fast" ends so even if items were lost."""
+
+
+@dataclass(frozen=True, slots=True)
 class Arrived(Event):
     """The whole list has arrived, or enough of it to reject it."""
+
+    whole: WholeList
 
 
 class Delivered(Event):
@@ -86,8 +98,15 @@ class UploadState:
         """The station repeats an item of a list that has arrived."""
 
 
+class Waiting(UploadState):
+    """Another transfer runs. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
+
+    seconds = 2.5
+    timeout = OCCUPIED
+
+
 class Asking(UploadState):
-    """The flight controller is asked if it can take a list, once other transfers have ended."""
+    """The flight controller has been asked if it can take a list."""
 
     seconds = 5.0
     timeout = Refusal(MissionResult.DENIED, sentences.NO_ANSWER())
@@ -120,14 +139,22 @@ class Receiving(UploadState):
         return (self.list.ask_again(now),)
 
 
-class Delivering(UploadState):
-    """The list is stored, written and read back, after others: 146 records take 25 s at 1200 baud.
+class Closing(Receiving):
+    """Mission Planner's "Write Fast" has ended. Delayed items may still arrive."""
 
-    The last two items are requested again while the station waits for the final ack.
-    """
+    seconds = 0.3
 
-    seconds = 60.0
-    timeout = Refusal(MissionResult.DENIED, sentences.STILL_WRITING())
+    def __init__(self, upload: "Upload", event: SenderFinished, now: float) -> None:
+        UploadState.__init__(self, upload, event, now)
+        assert isinstance(upload.state, Receiving)
+        self.list, missing = upload.state.list, upload.state.list.missing
+        why = sentences.ITEMS_MISSING(missing, upload.count) if missing else sentences.MESSAGES_LOST()
+        self.timeout = Refusal(MissionResult.OPERATION_CANCELLED, why)
+
+
+class _Whole(UploadState):
+    """The whole list is here. The last two items are requested again while the station waits for the final ack."""
+
     is_awaited = True
 
     def __init__(self, upload: "Upload", event: Event, now: float) -> None:
@@ -146,6 +173,28 @@ class Delivering(UploadState):
         self.item_repeated(now)
         # MAVSDK allows five repeats. Only a request for the item after the one before resets its count.
         return tuple(range(max(self._count - 2, 0), self._count))
+
+
+class Complete(_Whole):
+    """The list has arrived, or it is a clear, and another is being written."""
+
+    seconds = 2.5
+    timeout = OCCUPIED
+
+    def __init__(self, upload: "Upload", event: Arrived, now: float) -> None:
+        super().__init__(upload, event, now)
+        self.whole = event.whole
+
+    @property
+    def received(self) -> tuple[MissionItem, ...]:
+        return self.whole.items
+
+
+class Delivering(_Whole):
+    """The list is stored, written and read back: 146 records take 25 s at 1200 baud."""
+
+    seconds = 60.0
+    timeout = Refusal(MissionResult.DENIED, sentences.STILL_WRITING())
 
 
 class DeliveringDespiteCancel(Delivering):
@@ -177,7 +226,7 @@ class Upload:
     is_part: bool = False
 
     def __post_init__(self) -> None:
-        self.state: UploadState = Asking(self, Event(), self.heard_at)
+        self.state: UploadState = Waiting(self, Event(), self.heard_at)
 
 
 class Fixed(Enum):
@@ -192,18 +241,21 @@ class Fixed(Enum):
 
 _Row = tuple[type[UploadState] | Fixed, ...]
 _NEVER, _STAYS, _END = Fixed.NEVER, Fixed.STAYS, Fixed.END
-_EVENTS = Ready, Arrived, Delivered, Ended, Cancelled, Replaced
-_WRITING = _NEVER, _NEVER, _END, _END
+_EVENTS = Turn, Ready, Arrived, SenderFinished, Delivered, Ended, Cancelled, Replaced
+_WRITING = _NEVER, _NEVER, _NEVER, _NEVER, _END, _END
 # fmt: off
 _ROWS: Mapping[type[UploadState], _Row] = {
-    #           Ready      Arrived     Delivered Ended Cancelled Replaced
-    Asking:    (Receiving, Delivering, _NEVER,   _END, _END,     _END),
-    Receiving: (_NEVER,    Delivering, _NEVER,   _END, _END,     _END),
+    #           Turn        Ready      Arrived   SenderFinished Delivered Ended Cancelled Replaced
+    Waiting:   (Asking,     _NEVER,    Complete, _NEVER,        _NEVER,   _END, _END,     _END),
+    Asking:    (_NEVER,     Receiving, _NEVER,   _NEVER,        _NEVER,   _END, _END,     _END),
+    Receiving: (_NEVER,     _NEVER,    Complete, Closing,       _NEVER,   _END, _END,     _END),
+    Closing:   (_NEVER,     _NEVER,    Complete, _STAYS,        _NEVER,   _END, _END,     _END),
+    Complete:  (Delivering, _NEVER,    _NEVER,   _STAYS,        _NEVER,   _END, _END,     _END),
     #                                    Cancelled                Replaced
     Delivering:              (*_WRITING, DeliveringDespiteCancel, DeliveringUnanswered),
     DeliveringDespiteCancel: (*_WRITING, _STAYS,                  DeliveringUnanswered),
     DeliveringUnanswered:    (*_WRITING, _STAYS,                  _STAYS),
 }
 # fmt: on
-#: State -> event -> next state. A clear does not ask for items.
+#: State -> event -> next state. A clear does not ask for items: it waits, and is complete.
 TRANSITIONS = {state: dict(zip(_EVENTS, row, strict=True)) for state, row in _ROWS.items()}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A ground station writes a mission: the vehicle's side of MAVLink's upload (docs/mission-rules.md).
 
-Lists are received in parallel, and written one by one. Mission Planner loses some packets, and takes any ack to
+Lists are received in parallel, and written one at a time. Mission Planner loses some packets, and takes any ack to
 MISSION_COUNT as "continue". Most special cases below respond to a behaviour listed in docs/ground-stations.md.
 """
 
@@ -18,7 +18,7 @@ from bridge.gcs.station import Peer
 from bridge.line.conversation import Conversation
 from bridge.missions.fc_mission_store import StoreReport
 from bridge.missions.list_check import begin_check, check_count
-from bridge.missions.mission_service import DeliveryResult, MissionService, MissionTransfer, TransferStep
+from bridge.missions.mission_service import OCCUPIED, DeliveryResult, MissionService, MissionTransfer, TransferStep
 from bridge.model.events import Emit, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import WholeList
@@ -29,6 +29,7 @@ from bridge.transfers.upload_states import (
     Arrived,
     Asking,
     Cancelled,
+    Complete,
     Delivered,
     Delivering,
     DeliveringDespiteCancel,
@@ -39,8 +40,11 @@ from bridge.transfers.upload_states import (
     Ready,
     Receiving,
     Replaced,
+    SenderFinished,
+    Turn,
     Upload,
     UploadState,
+    Waiting,
 )
 from bridge.voice import sentences
 from bridge.voice.happening import Happening
@@ -57,6 +61,8 @@ Handler = Callable[[Sender, Message, float], object]
 _TOO_MANY_UPLOADS = Refusal(MissionResult.DENIED, sentences.TOO_MANY_UPLOADS())
 #: A ground station that reads the mission has given up an upload that was silent for this long.
 _SILENT_S = 1.0
+#: An upload that waits for the end of another transfer looks again at this interval.
+_LOOK_AGAIN_S = 0.05
 _AGAIN = Replaced("the station started again")
 
 
@@ -69,7 +75,6 @@ class MissionUploads:
         self._emit = emit
         #: In the order of their MISSION_COUNT.
         self._uploads: list[Upload] = []
-        self._is_asking = False
         self.answers = UploadAnswers(ground, missions.mission_type)
         #: The time of the next `tick`, or infinity if there is no upload, and no answer to repeat.
         self.due = inf
@@ -146,19 +151,22 @@ class MissionUploads:
             if isinstance(taken, int):
                 self._request(upload, taken)
             elif taken is not None:
-                self._arrived(upload, taken, now)
+                self._handle(upload, Arrived(taken), now)
+            else:
+                self.due = min(self.due, state.due)
 
     def ack(self, sender: Sender, result: int, now: float) -> None:
         """MISSION_ACK from a ground station: an error cancels the upload, ACCEPTED ends "Write Fast"."""
         upload = self._of(sender)
-        if upload is None or sender.is_older(upload.number):
+        if upload is None:
             return
-        state, is_end = upload.state, result == MissionResult.ACCEPTED
-        upload.is_write_fast |= is_end
-        if isinstance(state, Receiving) and is_end and state.received and (missing := state.list.missing):
-            self._handle(upload, Ended(_cancelled(sentences.ITEMS_MISSING(missing, upload.count))), now)
-        elif not (is_end or isinstance(state, Delivering)):
+        upload.is_write_fast |= result == MissionResult.ACCEPTED
+        if isinstance(upload.state, Delivering):
+            return
+        if result != MissionResult.ACCEPTED:
             self._handle(upload, Ended(_cancelled(sentences.CANCELLED_WITH(result))), now)
+        elif upload.state.received:
+            self._handle(upload, SenderFinished(), now)
 
     def reads(self, sender: Sender, now: float) -> None:
         """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
@@ -170,17 +178,18 @@ class MissionUploads:
 
     def end(self, refusal: Refusal, now: float) -> None:
         """End the uploads not yet delivered: the craft was armed, the flight controller lost, or the bridge stops."""
-        for upload in self._within(Asking, Receiving):
+        for upload in self._within(Waiting, Asking, Receiving, Complete):
             self._handle(upload, Ended(refusal), now)
 
     def peer_gone(self, peer: Peer, now: float) -> None:
         """A ground station's connection is closed: the uploads end without waiting for the timeout."""
-        for upload in self._within(Asking, Receiving):
+        for upload in self._within(Waiting, Asking, Receiving, Complete):
             if upload.sender.peer == peer:
                 self._handle(upload, Ended(_cancelled(sentences.DISCONNECTED())), now)
 
     def tick(self, now: float) -> None:
-        """Repeat requests and answers, end states at their deadlines."""
+        """Repeat requests and answers, end states at their deadlines, continue the uploads whose turn has come."""
+        self.due = inf
         for upload in [*self._uploads]:
             state = upload.state
             if now >= state.deadline:
@@ -191,7 +200,14 @@ class MissionUploads:
                     self._follow(upload, now)
                 self._request(upload, *state.repeats(now))
         self.answers.tick(now)
-        self.due = min((upload.state.due for upload in self._uploads), default=inf)
+        for upload in self._within(Waiting, Complete):
+            event = self._turn(upload, now)
+            if event is not None:
+                self._handle(upload, event, now)
+        for upload in self._uploads:
+            self.due = min(self.due, upload.state.due)
+            if isinstance(upload.state, Waiting | Complete):
+                self.due = min(self.due, now + _LOOK_AGAIN_S)
         self.due = min(self.due, self.answers.due)
 
     def _within(self, *states: type[UploadState]) -> list[Upload]:
@@ -210,27 +226,25 @@ class MissionUploads:
         number = sender.number
         upload = Upload(sender, count, mission_type, now, number)
         self._uploads.append(upload)
-        self.due = min(self.due, upload.state.due)
-        if (refusal := self._missions.refusal()) is not None:
-            self._handle(upload, Ended(refusal), now)
-        elif not count:
-            self._arrived(upload, WholeList((), CLEARED_LIST), now)
-        elif not self._is_asking:
-            # The reply serves all that wait for it.
-            self._is_asking = True
-            self._missions.run(self._missions.preflight(), self._asked, now)
+        self.due = 0.0
+        armed = self._missions.armed_refusal()
+        if armed is not None:
+            self._handle(upload, Ended(armed), now)
 
-    def _arrived(self, upload: Upload, whole: WholeList, now: float) -> None:
-        """Write a list, once others are written."""
-        is_write = whole.verdict.result is not Result.REJECTED
-        if is_write and not upload.sender.station.allows(Cost.FLASH):
-            self._handle(upload, Ended(Refusal(MissionResult.DENIED, sentences.FLASH_WEAR())), now)
-            return
-        self._handle(upload, Arrived(), now)
-        held = self._missions.held
-        upload.is_part = held is not None and _is_part(whole.verdict.items, held.items)
-        delivered = partial(self._delivered, upload, whole.verdict)
-        self._missions.run(self._delivery(upload, whole), delivered, now)
+    def _turn(self, upload: Upload, now: float) -> Event | None:
+        """The event that continues an upload, None if it must wait for others."""
+        state = upload.state
+        if isinstance(state, Complete):
+            refusal = self._missions.acquire(upload)
+            is_write = state.whole.verdict.result is not Result.REJECTED
+            if refusal is None and is_write and not upload.sender.station.allows(Cost.FLASH):
+                refusal = Refusal(MissionResult.DENIED, sentences.FLASH_WEAR())
+        else:
+            refusal = self._missions.occupied()
+        if refusal is not None:
+            return None if refusal is OCCUPIED else Ended(refusal)
+        is_clear = isinstance(state, Waiting) and not upload.count
+        return Arrived(WholeList((), CLEARED_LIST)) if is_clear else Turn()
 
     def _handle(self, upload: Upload, event: Event, now: float) -> None:
         """Change the state of an upload, unless it has ended meanwhile."""
@@ -241,12 +255,23 @@ class MissionUploads:
         assert after is not Fixed.NEVER, f"{event} in {before}"
         if isinstance(after, type):
             upload.state = after(upload, event, now)
-            self.due = min(self.due, upload.state.due)
+            self.due = 0.0 if after is Complete else min(self.due, upload.state.due)
         elif after is Fixed.END:
             self._uploads.remove(upload)
+            self._missions.release(upload)
+            self.due = 0.0 if self._uploads else self.due
         if isinstance(before, Receiving) or isinstance(upload.state, Receiving):
             self._missions.is_arriving = bool(self._within(Receiving))
         match event:
+            case Turn() if isinstance(before, Complete):
+                held = self._missions.held
+                upload.is_part = held is not None and _is_part(before.whole.verdict.items, held.items)
+                delivered = partial(self._delivered, upload, before.whole.verdict)
+                self._missions.run(self._delivery(upload, before.whole), delivered, now)
+            case Turn():
+                if self._within(Asking) == [upload]:
+                    # The reply serves all that wait for it.
+                    self._missions.run(self._missions.preflight(), self._asked, now)
             case Ready():
                 self._emit(UploadStarted(station=str(upload.sender), count=upload.count))
                 self._request(upload, 0)
@@ -260,7 +285,6 @@ class MissionUploads:
 
     def _asked(self, answer: StoreReport | Refusal, now: float) -> None:
         """The flight controller has answered whether it can take a list."""
-        self._is_asking = False
         for upload in self._within(Asking):
             event: Event
             if isinstance(answer, Refusal):

@@ -134,11 +134,12 @@ class Calibration:
             return ActionResult.REFUSED
         if action is CALIBRATE_ACCELEROMETER and controller.profile.calibrates_six_positions:
             return ActionResult.SIX_POSITIONS
-        if self._missions.runner.needs_line:
+        if self._missions.runner.needs_line or self._missions.acquire(self) is not None:
             return ActionResult.OCCUPIED
 
         def done(result: ActionResult | LinkLost, at: float) -> None:
             self._asked_for = None
+            self._missions.release(self)
             if isinstance(result, LinkLost):
                 result = ActionResult.NO_ANSWER
             elif result is ActionResult.DONE and controller.profile.restarts_after_calibration:

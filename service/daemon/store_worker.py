@@ -2,6 +2,7 @@
 """The mission store on its own thread: a slow SD card never delays the links."""
 
 import asyncio
+import os
 import time
 from collections.abc import Callable
 from functools import partial
@@ -39,6 +40,8 @@ class StoreWorker:
         self._thread = BackgroundThread("store", _TIMEOUT_S)
         self._loop = asyncio.get_running_loop()
         self._store: MissionStore | None = None
+        #: The file, or None while missions are kept in memory.
+        self._path: Path | None = None
         if directory is not None:
             self._thread.submit(partial(self._open, directory))
 
@@ -90,7 +93,7 @@ class StoreWorker:
             self._store = store_in_memory()
             post(self._loop, self._on_trouble, str(error))
             return
-        self._store = opened.store
+        self._store, self._path = opened.store, directory / DATABASE_NAME
         if opened.set_aside is not None:
             what = f"a new mission store was created with the {opened.salvaged} missions that could be read"
             _log.error("store.damaged", kept_as=str(opened.set_aside), what=what)
@@ -102,6 +105,8 @@ class StoreWorker:
             self._store.close()
         except StoreError as error:
             _log.error("store.failed", why=str(error))
+        if self._path is not None and not os.path.exists(self._path):
+            _log.error("store.failed", why=f"{self._path} was removed while the bridge ran: its missions are lost")
 
     def _do(self, effect: StoreEffect) -> object:
         nothing: object = RecalledMission() if isinstance(effect, Recall) else None

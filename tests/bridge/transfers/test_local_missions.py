@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line and ground stations write one after the other."""
+"""The command line and ground stations exclude each other."""
 
 from bridge.transfers.upload_states import Delivering
-from tests.support.conversations import count_message, item_message, records_of, waypoints
-from tests.support.upload_bench import A, acks, hanging_push, holding, requested, state
+from tests.support.conversations import ack_message, count_message, item_message, records_of, waypoints
+from tests.support.upload_bench import OLD, A, acks, hanging_push, holding, requested, state
 
 
-def test_an_upload_waits_for_a_push_from_the_command_line() -> None:
+def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
     world, station = holding()
     hanging_push(world)
-    for _ in range(4):
-        station.send(count_message(5))
-        world.run(0.7)
+    for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
+        station.send(message)
+    world.run(2.4)
     assert station.messages("MISSION_ACK", "MISSION_REQUEST", "STATUSTEXT") == []
-    world.run(1)
-    assert set(requested(station)) == {0}
+    world.run(0.2)
+    assert acks(station) == [A.DENIED]
+    assert station.texts() == ["Another mission transfer is running: try again"]
 
 
-def test_a_push_from_the_command_line_waits_for_an_upload() -> None:
+def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     world, station = holding()
     outcome = world.push(waypoints(146))
     station.send(count_message(5))
@@ -30,9 +31,8 @@ def test_a_push_from_the_command_line_waits_for_an_upload() -> None:
         station.send(item_message(seq, item))
     world.run(0.02)
     assert state(world) is Delivering
-    world.push(waypoints(3))
-    world.wait_until(lambda _: bool(acks(station)), 2)
+    denied = world.push(waypoints(3))
+    assert denied[0][0].text == "Another mission transfer is running: try again"
+    world.run(1)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(waypoints(5))
-    world.run(1)
-    assert world.stored == records_of(waypoints(3))

@@ -249,6 +249,20 @@ def test_the_upload_of_a_station_that_disconnects_ends_at_once() -> None:
     assert world.stored == OLD_RECORDS
 
 
+def test_a_list_announced_again_before_the_write_is_received_again() -> None:
+    """The new one may differ: the ack of the previous list would seem to be its own."""
+    world, station = holding()
+    receiving(world, station, waypoints(8), 7)
+    world.store.delay_s = 1.0
+    world.push(waypoints(3))
+    station.send(item_message(7, waypoints(8)[7]))
+    world.run(0.1)
+    station.send(count_message(8))
+    world.run(8)
+    assert A.ACCEPTED not in acks(station)
+    assert world.stored != records_of(waypoints(8))
+
+
 def test_a_late_error_ack_does_not_end_a_write() -> None:
     world, station = holding()
     receiving(world, station, waypoints(60), 60)
@@ -268,6 +282,20 @@ def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     assert acks(station) == []
     assert world.stored == records_of(waypoints(60))
     assert world.inside.ground.station(station.peer) is None
+
+
+def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
+    world, station = holding()
+    receiving(world, station, waypoints(8), 7)
+    hanging_push(world)
+    station.send(item_message(7, waypoints(8)[7]))
+    world.run(2.4)
+    assert acks(station) == []
+    world.run(0.2)
+    assert acks(station) == [A.DENIED]
+    assert "Another mission transfer is running: try again" in station.texts()
+    world.run(5)
+    assert world.stored == records_of(waypoints(3))
 
 
 @pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
@@ -457,6 +485,28 @@ def test_a_new_upload_ends_the_reminders() -> None:
     station.take()
     world.run(10)
     assert station.texts() == []
+
+
+def test_a_delayed_item_still_counts() -> None:
+    world, station = holding()
+    items = waypoints(35)
+    receiving(world, station, items, 34)
+    station.send(ack_message(A.ACCEPTED))
+    world.run(0.2)
+    station.send(item_message(34, items[34]))
+    world.run(1)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
+def test_a_new_count_clears_the_previous_refusal() -> None:
+    world, station = holding()
+    refused(world, station, 147, A.NO_SPACE, "only 146 fit")
+    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
+    station.take()
+    station.send(item_message(1, OLD[1]))
+    world.run(0.1)
+    assert acks(station) == []
 
 
 # While items arrive.

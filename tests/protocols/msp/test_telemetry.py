@@ -47,7 +47,7 @@ def test_status_has_the_sensors() -> None:
     [(b"", None, None), (struct.pack("<H", 2755), 2755, None), (struct.pack("<HH", 2755, 140), 2755, 140)],
 )
 def test_raw_gps_of_each_length_is_read(more: bytes, course_ddeg: int | None, hdop_e2: int | None) -> None:
-    gps = t.decode_raw_gps(LEAST[3][1] + more)
+    gps = t.decode_raw_gps(LEAST[2][1] + more)
     assert gps == t.RawGps(1, 9, 453838000, -84733000, 131, 250, course_ddeg, hdop_e2)
 
 
