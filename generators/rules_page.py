@@ -65,6 +65,15 @@ FLIGHTS = {
     "INAV: landing of an aeroplane by an FW approach": "source: navigation/navigation.c:1848, fwAutolandApproachConfig",
     "INAV: aeroplane, rover and boat": "source: the lines in the second table of docs/inav.md",
 }
+#: Rules without flights of the opposite: these say how an item is flown, or that a board needs nothing.
+_AS_SHOWN = (
+    "Harakiri: holds, turns, radii, the place and height of RETURN_TO_LAUNCH",
+    "Harakiri: heights on the way, fly through or brake, the nose on a ROI, LAND where it is",
+    "Harakiri: whole lists on the emulated board",
+    "INAV: each row of the first table of docs/inav.md",
+    "INAV: TAKEOFF is not needed",
+    "INAV: heights above sea level",
+)
 
 
 def flights() -> str:
@@ -72,8 +81,9 @@ def flights() -> str:
     rows = ""
     for rule, by in FLIGHTS.items():
         file, _, name = by.partition("::")
-        rows += f"| {rule} | {f'`{name}` in `{file}`' if name else by} |\n"
-    return f"| rule at Write | confirmed by |\n|---|---|\n{rows}"
+        ways = "as shown" if rule in _AS_SHOWN else "both ways"
+        rows += f"| {rule} | {f'`{name}` in `{file}` | {ways}' if name else f'{by} | not flown'} |\n"
+    return f"| rule at Write | confirmed by | flown |\n|---|---|---|\n{rows}"
 
 
 def table() -> str:

@@ -164,11 +164,11 @@ class InavPlaces:
         return not inside and any(self._distance_m(number, position) <= _IGNORED_M for number in inclusive)
 
     def action_ahead(self, here: tuple[int, int], target: tuple[int, int]) -> int:
-        """The action of the first zone whose border is within 150 m on the way to a place, or 0 if none is."""
+        """The action of the first zone whose border is within 150 m on the course to a place, or past it; 0: none."""
         active = [(number, _ZONE.unpack(zone)) for number, zone in enumerate(self._zones_in_force)]
         active = [(number, zone) for number, zone in active if zone[6] and zone[5]]
-        metres = _metres(here, target)
-        for step in range(1, round(min(metres, _DETECTED_M) / _SAMPLED_M) + 1):
+        metres = max(_metres(here, target), 0.01)
+        for step in range(1, _DETECTED_M // _SAMPLED_M + 1):
             share = step * _SAMPLED_M / metres
             place = tuple(round(start + share * (end - start)) for start, end in zip(here, target, strict=True))
             for number, zone in active:

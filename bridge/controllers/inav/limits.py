@@ -123,6 +123,7 @@ class InavLimits:
     nav_rth_alt_mode: int = RthAltMode.AT_LEAST
     safehome_usage_mode: int = SafehomeUsageMode.RTH
     safehome_max_distance: int = 20000
+    geozone_mr_stop_distance: int = 15000
     safehomes: tuple[Safehome, ...] = ()
     zones: tuple[Geozone, ...] = ()
     selected: int = 1
@@ -172,7 +173,7 @@ class InavLimits:
             yield from first_of([(place, why.format(self.platform.value)) for place in cases], part.value[1], news)
         if self.platform is Platform.MULTIROTOR:
             yield from self._speeds(records)
-        yield from judge_zones(self.zones, path, departure)
+        yield from judge_zones(self.zones, path, departure, self.geozone_mr_stop_distance / 100)
         yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
         if self.selected > 1:
             has_approaches = self.platform is Platform.AEROPLANE and self.approach is not None
@@ -237,10 +238,9 @@ class InavLimits:
 
     def _near_safehome(self, start: Place) -> Safehome | None:
         """The one that INAV chooses where it is armed."""
-        on = [each for each in self.safehomes if each.enabled]
-        nearest = min(on, key=lambda each: distance_m(start, each), default=None)
-        is_near = nearest is not None and distance_m(start, nearest) * 100 <= self.safehome_max_distance
-        return nearest if is_near else None
+        limit_m = self.safehome_max_distance / 100
+        near = [each for each in self.safehomes if each.enabled and distance_m(start, each) <= limit_m]
+        return min(near, key=lambda each: distance_m(start, each), default=None)
 
 
 def _landing(place: int, approach: FwApproach | None) -> Judgement:

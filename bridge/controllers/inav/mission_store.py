@@ -102,10 +102,7 @@ class InavMissions(NavMissions, FliesToItems):
 
     def report(self) -> Conversation[StoreReport | None]:
         """Also read the settings and approaches that the rules depend on, if they may have changed."""
-        if self._are_limits_doubtful:
-            yield from self._read_limits()
-        else:
-            yield from self._read_decisive_limits()
+        yield from self._read_limits() if self._are_limits_doubtful else self._read_decisive_limits()
         if self._approaches is None and not self._vehicle.armed:
             self._approaches = yield from read_approaches(range(APPROACHES))
         return (yield from super().report())
@@ -157,7 +154,8 @@ class InavMissions(NavMissions, FliesToItems):
         return (yield from self._is_unchanged(seen))
 
     def why_stopped(self, place: Place) -> str:
-        return zone_ahead(() if self._limits is None else self._limits.zones, place)
+        limits = self._limits or InavLimits()
+        return zone_ahead(limits.zones, place, limits.geozone_mr_stop_distance / 100)
 
     def leg_of(self, records: Sequence[NavRecord], seq: int) -> int:
         numbers = (number for number, shown in enumerate(item_seqs(records), 1) if shown == seq)
@@ -358,7 +356,7 @@ def fly_to(
         return _NO_ANSWER
     if ARM_BOX not in active or not active & MISSION_BOXES or status.mode != NavMode.MISSION:
         return _NOT_FLOWN
-    if _is_down(status):
+    if status.state in LANDING or (status.error == FINISHED and status.action == NavAction.LAND):
         return _LANDS
     if (yield from held) != record:
         return _CHANGED
@@ -376,10 +374,6 @@ def fly_to(
 def _ask_status() -> Conversation[NavStatus | None]:
     reply = yield from ask(request(Msp.NAV_STATUS), Msp.NAV_STATUS, NAV_STATUS_SIZE)
     return None if reply is None else decode_nav_status(reply.payload)
-
-
-def _is_down(status: NavStatus) -> bool:
-    return status.state in LANDING or (status.error == FINISHED and status.action == NavAction.LAND)
 
 
 def _refused(board: FlightController) -> Refusal:

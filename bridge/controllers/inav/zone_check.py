@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mission's way and INAV's geozones (navigation_geozone.c of 9.1.0; flown by tests/real_inav/test_sitl.py).
+"""A mission's way and INAV's geozones (navigation_geozone.c of 9.1.0; flown by tests/real_inav/test_zones.py).
 
 In its waypoint mode INAV acts at a border only if the zone has an action and the switch of ANGLE (HORIZON, COURSE HOLD,
 CRUISE) is on as well (performeFenceAction). Of six returns on the SITL three flew around a zone, three through it, with
@@ -17,11 +17,12 @@ from reports.finding import News
 
 #: Inclusive zones whose corners are further away are off (GEOZONE_INCLUSE_IGNORE_DISTANCE).
 _IGNORED_M = 2000
-#: A stop begins 150 m before a border, by default.
-_AHEAD_M = 200
+#: A craft that stops drifts on, or back.
+_DRIFT_M = 50
 
 
-def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
+def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure, stop_m: float) -> Iterable[Judgement]:
+    """stop_m: INAV acts when the course over ground meets a border so far ahead, even if the leg ends before it."""
     blocked = [_blocks_arming(zones, place) for place in departure.places if place is not None]
     if blocked and blocked[0]:
         # A list is rejected only if INAV would arm neither where the craft is nor at the list's home.
@@ -29,28 +30,30 @@ def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure)
         yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", news)
     for zone in zones:
         if not zone.is_inclusive:
-            through = [leg for leg in path.legs if _shares_height(zone, leg) and any(_insides([zone], leg))]
+            near = [leg for leg in path.legs if _shares_height(zone, leg)]
+            through = [leg for leg in near if any(_insides([zone], leg, stop_m if zone.action else 0))]
             yield from _met(through, f"geozone {zone.number}", zone.action)
     inclusive = [zone for zone in zones if zone.is_inclusive]
     if departure.place is not None and any(_is_inside(zone, departure.place) for zone in inclusive):
-        leaving = [leg for leg in path.legs if not all(_insides(inclusive, leg))]
-        yield from _met(leaving, "leaves zones", max(zone.action for zone in inclusive))
+        action = max(zone.action for zone in inclusive)
+        leaving = [leg for leg in path.legs if not all(_insides(inclusive, leg, stop_m if action else 0))]
+        yield from _met(leaving, "the zone border", action)
 
 
 def _met(legs: Sequence[Leg], what: str, action: int) -> Iterable[Judgement]:
     if not action:
         yield from first_of([(leg.cause, f"{what}: flown, no action is set") for leg in legs], "lat_e7", News.NOTICE)
         return
-    stop = "a return" if action == FenceAction.RTH else "a stop"
-    either = "flown through, or around", f"flown, or {stop} if ANGLE is on"
-    yield from first_of([(leg.cause, f"{what}: {either[not leg.is_return]}") for leg in legs], "lat_e7")
+    for leg in legs[:1]:
+        stops = f"{'returns' if action == FenceAction.RTH else 'stops'} at {what} if ANGLE is on"
+        yield Judgement(leg.cause, "lat_e7", f"{what}: flown through, or around" if leg.is_return else stops)
 
 
-def zone_ahead(zones: Sequence[Geozone], place: Place) -> str:
+def zone_ahead(zones: Sequence[Geozone], place: Place, stop_m: float) -> str:
     """The nearest border at which INAV may have stopped here, or empty if there is none."""
     near = [(_border_m(zone, place), zone) for zone in zones if zone.action]
     metres, zone = min(near, key=lambda each: each[0], default=(inf, None))
-    if zone is None or metres > _AHEAD_M:
+    if zone is None or metres > stop_m + _DRIFT_M:
         return ""
     return f"{metres:.0f} m from the border of geozone {zone.number}"
 
@@ -94,9 +97,10 @@ def _is_inside(zone: Geozone, place: Place) -> bool:
     return is_inside
 
 
-def _insides(zones: Sequence[Geozone], leg: Leg) -> Iterable[bool]:
-    """For each part of the leg between two borders: True if it is inside any of the zones."""
-    shares = sorted({0.0, 1.0, *(share for zone in zones for share in _borders(zone, leg) if 0 < share < 1)})
+def _insides(zones: Sequence[Geozone], leg: Leg, ahead_m: float) -> Iterable[bool]:
+    """For each part between two borders of the leg, and so far past its end: True if it is inside any of the zones."""
+    last = 1.0 if leg.is_return else 1 + ahead_m / max(leg.length_m, 0.01)
+    shares = sorted({0.0, last, *(share for zone in zones for share in _borders(zone, leg) if 0 < share < last)})
     for one, other in pairwise(shares):
         share = (one + other) / 2
         lat_e7 = leg.start.lat_e7 + round(share * (leg.end.lat_e7 - leg.start.lat_e7))

@@ -257,11 +257,11 @@ ANGLE = 1 << 3
 NORTH = 8983
 
 
-def fenced(action: FenceAction, boxes: int, *, is_inclusive: bool = False) -> Flight:
-    """Legs to the north, 100 m and 500 m; an exclusive zone 300 m away, or an inclusive one of 300 m."""
+def fenced(action: FenceAction, boxes: int, *, is_inclusive: bool = False, last: float = 5) -> Flight:
+    """Legs to the north, 100 m and 100 * last; an exclusive zone 300 m away, or an inclusive one of 300 m."""
     hundreds, radius_cm = (0, 30000) if is_inclusive else (3, 3000)
     zone = Geozone(0, is_inclusive, (Corner(453838000 + hundreds * NORTH, 84733000),), radius_cm, action=action)
-    flight = Flight(*(waypoint(20, lat_e7=453838000 + at * NORTH, lon_e7=84733000, p1=1000) for at in (1, 5)))
+    flight = Flight(*(waypoint(20, lat_e7=453838000 + round(at * NORTH), lon_e7=84733000, p1=1000) for at in (1, last)))
     bench = flight.bench
     set_zone(bench.board, zone)
     bench.faults.boxes = boxes
@@ -285,7 +285,7 @@ def fenced(action: FenceAction, boxes: int, *, is_inclusive: bool = False) -> Fl
 def test_a_zone_stops_a_mission_as_on_inavs_own_sitl(
     action: FenceAction, boxes: int, is_inclusive: bool, mode: int
 ) -> None:
-    """tests/real_inav/test_sitl.py flies the same."""
+    """tests/real_inav/test_zones.py flies the same."""
     flight = fenced(action, boxes, is_inclusive=is_inclusive)
     assert flight.seen[-1][0] == mode
     if mode == HOLD:
@@ -293,6 +293,12 @@ def test_a_zone_stops_a_mission_as_on_inavs_own_sitl(
         assert flight.away_from(waypoint(0, lat_e7=453838000 + NORTH * before // 100, lon_e7=84733000)) < 20
         flight.bench.faults.boxes = NAV_WP
         flight.until(is_finished)
+
+
+@pytest.mark.parametrize(("last", "mode"), [(1.1, NAV), (1.6, HOLD)])
+def test_a_zone_past_the_end_of_a_leg_stops_it(last: float, mode: int) -> None:
+    """270 m away: INAV looks 150 m ahead on its course."""
+    assert fenced(FenceAction.POS_HOLD, NAV_WP | ANGLE, last=last).seen[-1][0] == mode
 
 
 @pytest.mark.parametrize(("platform", "seconds", "height_m"), [(0, 20, 20), (1, 33, 20), (4, 33, 0), (5, 33, 0)])

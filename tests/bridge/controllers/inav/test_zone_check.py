@@ -48,54 +48,65 @@ def square(north: float, size: float, *, is_inclusive: bool = False) -> Geozone:
 
 
 LEGS = at(1), at(3)
-LEAVES = "leaves zones: flown, or a stop if ANGLE is on"
-THROUGH = "WP 2: geozone {}: flown, or a stop if ANGLE is on"
+STOPS = "stops at {} if ANGLE is on"
 
 
 @pytest.mark.parametrize(
-    ("zone", "is_through"),
+    ("zone", "stops_at"),
     [
-        (circle(2), True),
-        (circle(2, 0.4), True),
-        (circle(2, 0.6), False),
-        (circle(4), False),
-        (square(2, 0.3), True),
-        (square(4.2, 1), False),
-        (circle(2, highest_cm=4000), False),
-        (circle(2, highest_cm=6000), True),
-        (circle(2, lowest_cm=6000), False),
-        (circle(2, highest_cm=4000, is_above_sea=True), True),
+        (circle(2), 1),
+        (circle(2, 0.4), 1),
+        (circle(2, 0.6), 0),
+        (circle(3, radius_m=49), 2),
+        (circle(4.9), 2),
+        (circle(5.1), 0),
+        (square(2.9, 0.3), 2),
+        (square(5.6, 1), 0),
+        (circle(2, highest_cm=4000), 0),
+        (circle(2, highest_cm=6000), 1),
+        (circle(2, lowest_cm=6000), 0),
+        (circle(2, highest_cm=4000, is_above_sea=True), 1),
     ],
 )
-def test_a_leg_through_an_exclusive_zone_is_a_warning(zone: Geozone, is_through: bool) -> None:
+def test_a_leg_towards_an_exclusive_zone_within_150_m_is_a_warning(zone: Geozone, stops_at: int) -> None:
     """At 50 m."""
-    assert texts(zone, legs=LEGS) == ([THROUGH.format(zone.number)] if is_through else [])
+    said = f"WP {stops_at}: " + STOPS.format(f"geozone {zone.number}")
+    assert texts(zone, legs=LEGS) == ([said] if stops_at else [])
+
+
+def test_the_board_may_stop_closer_to_a_zone() -> None:
+    limits = InavLimits(nav_wp_max_safe_distance=0, zones=(circle(2),)).with_settings(
+        {"geozone_mr_stop_distance": 4000}
+    )
+    verdict = check_list((HOME, *LEGS), NavRules(NavProfile(limits=limits)), None)
+    assert [finding.text() for finding in verdict.findings] == ["WP 2: " + STOPS.format("geozone 0")]
 
 
 def test_a_leg_out_of_the_inclusive_zones_is_a_warning() -> None:
     field = square(0, 2, is_inclusive=True)
-    assert texts(field, legs=LEGS) == ["WP 2: " + LEAVES]
-    assert texts(field, circle(2.5, radius_m=100, is_inclusive=True), legs=LEGS) == []
+    assert texts(field, legs=LEGS) == ["WP 1: " + STOPS.format("the zone border")]
+    assert texts(field, circle(2.5, radius_m=250, is_inclusive=True), legs=LEGS) == []
     # Armed outside of all of them, INAV turns them off.
     assert texts(circle(30, is_inclusive=True), legs=LEGS) == []
 
 
 def test_zones_are_judged_on_the_way_as_flown() -> None:
     """From the craft, after a jump, around a corner, and back home."""
-    assert texts(circle(0.5, radius_m=20), legs=(at(1),)) == ["WP 1: geozone 0: flown, or a stop if ANGLE is on"]
-    corner = at(1), at(1, 2), at(3, 2), jump(1), at(3, 3)
-    assert texts(circle(2, 1, 40), legs=corner) == ["WP 4: geozone 0: flown, or a stop if ANGLE is on"]
+    into, out = STOPS.format("geozone 0"), STOPS.format("the zone border")
+    assert texts(circle(0.5, radius_m=20), legs=(at(1),)) == ["WP 1: " + into]
+    corner = at(1), at(1, 2), at(4, 2), jump(1), at(4, 4)
+    assert texts(circle(2.5, 1, 30), legs=corner) == ["WP 4: " + into]
     back = at(1), at(1, 2), RTL_LANDS
     assert texts(circle(0.5, 1, 30), legs=back) == ["WP 3: geozone 0: flown through, or around"]
-    places = [(-1, -1), (3, -1), (3, 0), (0, 0.5), (3, 1), (3, 3), (-1, 3)]
+    places = [(-3, -3), (3, -3), (3, -0.3), (0, 0.5), (3, 1.3), (3, 5), (-3, 5)]
     corners = tuple(Corner(LAT + round(n * NORTH), LON + round(e * EAST)) for n, e in places)
     concave = Geozone(1, True, corners, action=HOLDS)
-    assert texts(concave, legs=(at(2, -0.5), at(2, 2))) == ["WP 2: " + LEAVES]
+    assert texts(concave, legs=(at(1, -1.4), at(1, 2))) == ["WP 2: " + out]
     assert texts(concave, legs=(at(0, -0.5), at(-0.5, 2))) == []
 
 
-def test_several_legs_through_a_zone_are_one_warning() -> None:
-    assert texts(circle(2), legs=(at(1), at(3), at(1), at(3))) == [THROUGH.format(0) + " (+2)"]
+def test_only_the_first_stop_is_said() -> None:
+    assert texts(circle(2), legs=(at(1), at(3), at(1), at(3))) == ["WP 1: " + STOPS.format("geozone 0")]
 
 
 def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
@@ -105,7 +116,7 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
     outside = "Mission rejected: Home is outside geozone 0: it does not arm"
     assert texts(circle(10, is_inclusive=True), legs=LEGS) == [outside]
     # The craft is elsewhere, where it arms.
-    assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON))[0].startswith("WP 1: geozone 0")
+    assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON))[0] == "WP 1: " + STOPS.format("geozone 0")
     # The craft does not arm where it is, but at the home of the list.
     warning = "The craft is in geozone 0: it does not arm"
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
@@ -113,14 +124,14 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
 
 def test_without_an_action_a_zone_does_not_stop_anything() -> None:
     assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: flown, no action is set"]
-    assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 2: geozone 0: flown, or a return if ANGLE is on"]
+    assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 1: returns at geozone 0 if ANGLE is on"]
 
 
 def test_the_nearest_border_with_an_action_is_named_where_a_mission_stops() -> None:
     place = Corner(LAT, LON)
-    assert zone_ahead((circle(3, radius_m=150), square(5, 1)), place) == "150 m from the border of geozone 0"
-    assert zone_ahead((square(3, 2),), place) == "100 m from the border of geozone 3"
-    assert zone_ahead((circle(3), circle(2, action=FenceAction.NONE)), place) == ""
+    assert zone_ahead((circle(3, radius_m=150), square(5, 1)), place, 150) == "150 m from the border of geozone 0"
+    assert zone_ahead((square(3, 2),), place, 150) == "100 m from the border of geozone 3"
+    assert zone_ahead((circle(3), circle(2, action=FenceAction.NONE)), place, 150) == ""
 
 
 @pytest.mark.parametrize(
