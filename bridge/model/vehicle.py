@@ -290,8 +290,10 @@ class Vehicle:
         return last.mode if last is not None and isinstance(last.mode, FlightMode) else None
 
     def hear(self, reading: Reading) -> None:
-        """Store a reading in place of the previous one of the kind."""
+        """Store a reading in place of the previous one of the kind. A position that is no place is ignored."""
         kind = type(reading)
+        if isinstance(reading, GlobalPosition) and not _is_place(reading.lat_e7, reading.lon_e7):
+            return
         if isinstance(reading, FlightState) and reading.armed is not None:
             self._follow_arming(reading.armed, reading.heard_at)
         if isinstance(reading, Power):
@@ -378,7 +380,7 @@ class Vehicle:
     def place(self) -> tuple[int, int] | None:
         """Latitude and longitude of `home_or_position`, degrees * 1e7."""
         here = self.home_or_position()
-        return None if here is None or not _is_place(here.lat_e7, here.lon_e7) else (here.lat_e7, here.lon_e7)
+        return None if here is None else (here.lat_e7, here.lon_e7)
 
     def _place_home(self, *, has_armed: bool) -> None:
         """Home is where the craft was armed. It never moves in flight, even if the link is lost.
@@ -386,7 +388,7 @@ class Vehicle:
         Before the first arming it is the place of the craft. The flight controller's own home overrides both.
         """
         position, height = self.last(GlobalPosition), self.last(Height)
-        if position is None or not (position.lat_e7 and position.lon_e7):
+        if position is None:
             return
         here = Home(position.lat_e7, position.lon_e7, position.altitude_m)
         if has_armed:
