@@ -193,7 +193,7 @@ class FenceCheck(ListCheck):
             return None
         corners, self._corners, self._first = _anticlockwise(self._corners), [], None
         if _crosses_itself(corners):
-            return reject(MissionResult.INVALID, first, "command", "the sides of this polygon cross: move a corner")
+            return reject(MissionResult.INVALID, first, "command", "sides cross: move a corner")
         return self._add(first, Geozone(0, _POLYGONS[Command(item.command)], corners))
 
     def _add(self, item: MissionItem, zone: Geozone) -> RejectingFinding | None:
