@@ -11,6 +11,7 @@ import select
 import socket
 import struct
 import subprocess
+import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -122,11 +123,17 @@ class Sitl:
         self._process.wait(5)
 
     def line(self) -> str:
-        """Disconnect from it. Returns the line for a daemon."""
+        """Disconnect from it. Returns the line for a daemon. INAV's clock then goes like this machine's."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+        threading.Thread(target=self._keep_time, daemon=True).start()
         return f"tcp:127.0.0.1:{self._port}"
+
+    def _keep_time(self) -> None:
+        while self._process.poll() is None:
+            self._clock.let_pass(_STEP_S)
+            time.sleep(_STEP_S)
 
     def _connect(self) -> None:
         deadline = time.monotonic() + 60
