@@ -80,8 +80,8 @@ class FlightLimits:
                 outside.append((leg.target, why))
             elif leg.is_first and int(leg.length_m) > self.mission_first:
                 why = f"{NOT_FLOWN}: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
-                if departure.home is not None and int(distance_m(departure.home, leg.end)) <= self.mission_first:
-                    why = f"starts only at the list's home, {in_metres(leg.length_m)} off"
+                if home and departure.home and int(distance_m(departure.home, leg.end)) <= self.mission_first:
+                    why = f"starts only at the list's home, {in_metres(distance_m(home, departure.home))} off"
                 yield Judgement(leg.target, "lat_e7", why)
             elif int(leg.length_m) > MAX_LEG_M:
                 long.append((leg.target, f"{NOT_FLOWN}: {in_metres(leg.length_m)} leg, at most 2 km"))

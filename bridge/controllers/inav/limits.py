@@ -186,11 +186,11 @@ class InavLimits:
         limit_m = self.nav_wp_max_safe_distance
         if not limit_m or first.flag == FLY_HOME or not (first.lat_e7 or first.lon_e7) or departure.place is None:
             return
-        metres = distance_m(departure.place, first)
-        if metres <= limit_m:
+        if (metres := distance_m(departure.place, first)) <= limit_m:
             return
         if departure.home is not None and distance_m(departure.home, first) <= limit_m:
-            yield Judgement(0, "lat_e7", f"arms only near the list's home, {in_metres(metres)} off")
+            off = in_metres(distance_m(departure.place, departure.home))
+            yield Judgement(0, "lat_e7", f"arms only near the list's home, {off} off")
             return
         limit = f"nav_wp_max_safe_distance is {limit_m} m"
         yield Judgement(0, "lat_e7", f"{in_metres(metres)} from {departure.name}, {limit}: it would not arm", None)

@@ -57,7 +57,7 @@ CASES = [
     ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m off, mission_first 200 m"]),
     ((north(1), north(20), north(39), item(RTL)), None, ["WP 4: not flown: 3.9 km leg, at most 2 km"]),
     ((north(1), item(RTL, alt_m=120.0)), None, ["WP 2: not flown: 120 m, mission_height 100"]),
-    ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 400 m off"]),
+    ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 500 m off"]),
     ((north(6),), (LAT + 5 * NORTH, LON), []),
     # On a desk, 30 km away.
     ((north(1), item(RTL)), (LAT + 300 * NORTH, LON), ["flown only from the list's home, 30.0 km off"]),
