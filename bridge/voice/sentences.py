@@ -49,7 +49,8 @@ OUTPUTS = Sentence(_ERROR, "Motors, servos and relays cannot be driven here")
 JOYSTICK = Sentence(_ERROR, "Joystick ignored: fly with the transmitter")
 NO_CAMERA = Sentence(_ERROR, "Cameras and gimbals are not controlled here")
 ORIGIN = Sentence(_ERROR, "The origin is home, set by the flight controller")
-NO_EFFECT = Sentence(_ERROR, "{} is not supported", "COMPONENT_CONTROL_OF_A_LONG_NAME")
+#: The name comes last: QGroundControl shows a text that begins with "preflight" as a failed check.
+NO_EFFECT = Sentence(_ERROR, "Not supported: {}", "COMPONENT_CONTROL_OF_A_LONG_NAME")
 NO_FENCE = Sentence(_ERROR, "This flight controller has no fence")
 FENCE_SWITCH = Sentence(_ERROR, "Switch geozones in INAV's own settings")
 

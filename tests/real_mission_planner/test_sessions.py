@@ -25,7 +25,7 @@ BUTTONS = {
     "home": ("", "", "setHomeHereToolStripMenuItem_Click", "", "Home is set where the craft is armed"),
     "trigger": ("", "", "triggerCameraToolStripMenuItem_Click", "", "Cameras and gimbals are not controlled here"),
     "safety": ("CMB_action", "Toggle_Safety_Switch", "BUTactiondo_Click", "", NO_ARMING),
-    "parachute": ("CMB_action", "Do_Parachute", "BUTactiondo_Click", FAILED, "DO_PARACHUTE is not supported"),
+    "parachute": ("CMB_action", "Do_Parachute", "BUTactiondo_Click", FAILED, "Not supported: DO_PARACHUTE"),
     "loiter": ("CMB_action", "Loiter_Unlim", "BUTactiondo_Click", FAILED, FLY),
 }  # fmt: skip
 

@@ -10,6 +10,19 @@ from tests.real_qgroundcontrol.conftest import Sessions
 from tests.support.plan import PlanRow, plain_plan
 from tests.support.real_qgc import RealQgc
 
+#: Buttons and commands of a pilot, and the text beside the program's own dialog; None for a dialog of its own.
+BUTTONS: dict[tuple[str, ...], str | None] = {
+    ("arm", "1"): "Arm and disarm with the transmitter",
+    ("takeoff",): None,
+    ("goto",): "Fly the craft with the transmitter",
+    ("roi",): "Not supported: DO_SET_ROI_LOCATION",
+    ("sethome",): "Home is set where the craft is armed",
+    ("setwp", "2"): "This flight controller cannot fly missions",
+    ("calibrate", "1"): "Not supported: PREFLIGHT_CALIBRATION",
+    ("camera",): "Cameras and gimbals are not controlled here",
+    ("startMission",): None,
+    ("emergencyStop",): "Arm and disarm with the transmitter",
+}
 KINDS = {"naze": (), "inav": ("--kind", "inav"), "multiwii": ("--kind", "multiwii")}
 #: Boards without a list to show, and the word by which an upload is refused.
 WITHOUT_LIST = {
@@ -77,9 +90,9 @@ def test_without_a_list_connecting_is_quiet_and_an_upload_is_refused(session: Se
     assert qgc.seen("banner") == []
 
 
-@pytest.mark.parametrize(("loss", "pause_s"), [(0.0, 0.0), (0.0, 0.15), (0.0, 0.4), (0.15, 0.15), (0.15, 0.4)])
+@pytest.mark.parametrize(("loss", "pause_s"), [(0.0, 0.1), (0.0, 0.15), (0.0, 0.4), (0.15, 0.15), (0.15, 0.4)])
 def test_transfers_that_follow_at_once_do_not_end_each_other(session: Sessions, loss: float, pause_s: float) -> None:
-    """A repeated final ack would end the next transfer with "Mission accepted"."""
+    """A repeated final ack would end the next transfer with "Mission accepted". It comes within 60 ms."""
     qgc, _ = session(link={"loss": loss, "seed": 5})
     for number in range(6):
         qgc.write(plain_plan(4 + number))
@@ -101,6 +114,19 @@ def test_a_parameter_is_set_and_a_refused_value_is_a_failure(session: Sessions) 
     assert qgc.seen("dialog", began) == ["Parameter write failed: param: P_ROLL "]
     qgc.wait_for("message", "P_ROLL stays 44: 1..200", began)
     assert qgc.parameters()["P_ROLL"] == 44
+
+
+def test_each_button_is_answered_without_a_banner(session: Sessions) -> None:
+    qgc, _ = session()
+    qgc.write(plain_plan(5))
+    for button, text in BUTTONS.items():
+        began = qgc.now
+        qgc.do(*button)
+        if text is not None:
+            qgc.wait_for("message", text, began)
+        time.sleep(4)
+        assert len(qgc.seen("dialog", began)) <= 1, button
+        assert (qgc.seen("banner", began), "".join(qgc.seen("prearm", began))) == ([], ""), button
 
 
 def test_all_parameters_arrive_over_a_bad_link(session: Sessions) -> None:
