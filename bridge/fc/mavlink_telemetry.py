@@ -70,16 +70,13 @@ class MavlinkReadings:
         self.vehicle.hear(v.FlightState(now, v.Source.MAVLINK, armed))
 
     def attitude(self, message: Message, now: float) -> None:
-        self.hear_attitude(message, now, is_north_known=True, has_rates=True)
+        self.hear_attitude(message, now, is_north_known=True)
 
-    def hear_attitude(self, message: Message, now: float, *, is_north_known: bool, has_rates: bool) -> None:
+    def hear_attitude(self, message: Message, now: float, *, is_north_known: bool) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
         if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
             return
-        rates = None
-        if has_rates and math.isfinite(message.rollspeed + message.pitchspeed + message.yawspeed):
-            rates = math.degrees(message.rollspeed), math.degrees(message.pitchspeed), math.degrees(message.yawspeed)
-        self.vehicle.hear(v.Orientation(now, v.Source.MAVLINK, roll, pitch, yaw % 360, is_north_known, rates))
+        self.vehicle.hear(v.Orientation(now, v.Source.MAVLINK, roll, pitch, yaw % 360, is_north_known))
 
     def gps_raw_int(self, message: Message, now: float) -> None:
         if message.fix_type != m.GPS_FIX_TYPE_NO_GPS:

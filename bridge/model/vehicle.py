@@ -55,7 +55,7 @@ class Reading:
 
 @dataclass(slots=True)
 class Orientation(Reading):
-    """Right wing down and nose up are positive; heading 0 up to 360. rates_deg_s: roll, pitch, yaw.
+    """Right wing down and nose up are positive; heading 0 up to 360.
 
     is_north_known: False if the heading does not come from a compass (Harakiri then reports 0).
     """
@@ -64,7 +64,6 @@ class Orientation(Reading):
     pitch_deg: float
     heading_deg: float
     is_north_known: bool = True
-    rates_deg_s: tuple[float, float, float] | None = None
 
 
 @dataclass(slots=True)

@@ -76,7 +76,7 @@ class HarakiriReadings(MavlinkReadings):
         health = self.vehicle.last(v.Health)
         has_compass = health is not None and Sensor.COMPASS in health.sensors
         self.vehicle.hear_uptime(now, message.time_boot_ms / 1000)
-        self.hear_attitude(message, now, is_north_known=has_compass, has_rates=False)
+        self.hear_attitude(message, now, is_north_known=has_compass)
 
     def gps_raw_int(self, message: Message, now: float) -> None:
         gps = self.hear_fix(message, now)

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Harakiri's MAVLink messages where their meaning is its own."""
 
+import math
+
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.controllers.harakiri.profile import HarakiriReadings
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.model.vehicle import GlobalPosition, Height, Orientation, Signal, Vehicle
+from bridge.vehicle import vehicle_messages as make
+from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.frame import kinds
 
@@ -41,7 +45,9 @@ def test_rates_are_unknown_and_north_needs_a_compass() -> None:
     after = vehicle.last(Orientation)
     assert before is not None
     assert after is not None
-    assert before.rates_deg_s is after.rates_deg_s is None
+    packed = FrameWriter(1, 1).frame(make.attitude(make.Moment(vehicle, 1.0, 0)), 2)
+    shown = m.MAVLink(None).decode(bytearray(packed))
+    assert all(math.isnan(rate) for rate in (shown.rollspeed, shown.pitchspeed, shown.yawspeed))
     assert (before.is_north_known, after.is_north_known) == (False, True)
 
 
