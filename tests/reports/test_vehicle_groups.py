@@ -79,7 +79,6 @@ READINGS = st.tuples(
         pitch_deg=number(-90, 90),
         heading_deg=number(0, 359.999),
         is_north_known=st.booleans(),
-        rates_deg_s=st.none() | st.tuples(*[number(-2000, 2000)] * 3),
     ),
     readings(
         GpsFix,
