@@ -87,9 +87,7 @@ def push_mission(
             for trial in try_mission(session, prefix, meant, bridges, mission):
                 if trial.is_held:
                     delivery.held(trial.vehicle, f"Mission held already: {trial.count} records")
-        has_failed = push_file(session, prefix, delivery, mission, _MISSION, staged=staged, as_json=as_json)
-    if has_failed:
-        raise SystemExit(1)
+        push_file(session, prefix, delivery, mission, _MISSION, staged=staged, as_json=as_json)
 
 
 @click.command("verify", short_help="Compare the missions on vehicles with a file.")
@@ -141,8 +139,8 @@ def push_file(
     *,
     staged: bool,
     as_json: bool,
-) -> bool:
-    """Push a file and print the outcome. Returns True if a vehicle failed."""
+) -> None:
+    """Push a file and print the outcome. Exit code 1: a vehicle failed."""
     is_stopped = False
     try:
         with push_bar() as show:
@@ -157,7 +155,8 @@ def push_file(
     if is_stopped:
         complain(what.interrupted)
         raise SystemExit(INTERRUPTED)
-    return bool(delivery.failed)
+    if delivery.failed:
+        raise SystemExit(1)
 
 
 def _show_trials(trials: list[Trial], as_json: bool) -> None:

@@ -186,9 +186,7 @@ def restore_settings(
         if dry_run:
             _show_trials(try_settings(session, prefix, found, data), as_json)
             return
-        has_failed = push_file(session, prefix, FleetPush(found), data, _SETTINGS, staged=staged, as_json=as_json)
-    if has_failed:
-        raise SystemExit(1)
+        push_file(session, prefix, FleetPush(found), data, _SETTINGS, staged=staged, as_json=as_json)
 
 
 def _read(file: Path) -> bytes:

@@ -63,6 +63,7 @@ class Fault(Enum):
     )
     NOT_A_PLACE = "{text} is not LON,LAT,ALT", "write decimal points, and blanks only between points"
     NO_KML = "this zip archive holds no KML", "unpack it and give the mission"
+    SAME_TITLES = "two columns are titled {title}", "remove one of them"
     UNEQUAL_ROW = "{count} columns, but {wanted} titles", "save the table again, with decimal points"
     PLAN_VERSION = (
         "{what} is of version {version}, and only {known} can be read here",

@@ -110,6 +110,10 @@ class ListCheck(ABC):
             news = News.WARNING
         self._findings.append(Finding(item.seq, name, was, becomes, why, item.command, news))
 
+    def _say(self, text: str, news: News = News.WARNING) -> None:
+        """Report on the list as a whole."""
+        self._findings.append(Finding(None, "count", None, None, text, news=news))
+
     def _fit(self, item: MissionItem, name: str, allowed: Range, news: News = News.NOTICE) -> int:
         """Convert one field to a whole number that can be stored."""
         value: float = getattr(item, name)
@@ -135,7 +139,7 @@ class ListCheck(ABC):
             if place is None and news is None:
                 return reject_list(MissionResult.INVALID, self._count, why)
             if place is None:
-                self._findings.append(Finding(None, "count", None, None, why, news=news or News.DANGER))
+                self._say(why, news or News.DANGER)
             elif news is None:
                 return reject(_ACKS.get(field, MissionResult.INVALID), sent[place], field, why)
             else:

@@ -311,16 +311,11 @@ def _action(command: int, params: Sequence[float]) -> FcAction | None:
     if command == messages.MAV_CMD_DO_START_MAG_CAL and params[0] in (0, 1):  # all compasses, or the first
         return CALIBRATE_COMPASS
     if command == messages.MAV_CMD_PREFLIGHT_CALIBRATION:
-        asked = _asked(params)
+        asked = {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
         if asked in ({5: 1}, {5: 2}, {5: 4}):
             return CALIBRATE_ACCELEROMETER
         return CALIBRATE_COMPASS if asked == {2: 1} else None
     return None
-
-
-def _asked(params: Sequence[float]) -> dict[int, float]:
-    """The parameters that are set, by number from 1."""
-    return {number: param for number, param in enumerate(params, 1) if param and not math.isnan(param)}
 
 
 def _why_not(held: HeldMission, item: int, seq: float) -> Happening:

@@ -113,6 +113,8 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
     assert columns is not None
     separator, titles, lat, lon = columns
     alt = next((title for title in _CSV_ALT if title in titles), None)
+    if same := next((title for title in (lat, lon, alt) if title is not None and titles.count(title) > 1), None):
+        raise MissionFileError(name, "line 1", *Fault.SAME_TITLES(title=same))
     others = len(titles) - 2 - (alt is not None)
     points = []
     for number, row in enumerate(_rows(text, separator, name), start=1):

@@ -103,7 +103,7 @@ class HarakiriFcSettings(FcSettings):
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
         """The values of the previous table if their checksum is still the board's: then that is three requests."""
-        listed = None if previous is None else _listed(previous)
+        listed = None if previous is None else [each for each in previous if isinstance(each.handle, _Place)]
         for _ in range(_READINGS):
             whole = yield from _whole()
             if whole is None:
@@ -220,11 +220,6 @@ def _read(total: int, reading: TableReading) -> Conversation[list[BoardSetting] 
         found += map(_shown, count(len(found)), reply.settings)
         yield Pause(reading.pace(len(frame) + FRAME_OVERHEAD + reply.size))
     return found
-
-
-def _listed(table: SettingTable) -> list[BoardSetting]:
-    """The settings of a table that the board lists by SETTING, in its order."""
-    return [setting for setting in table if isinstance(setting.handle, _Place)]
 
 
 def _is(listed: Sequence[BoardSetting], whole: TableReply) -> bool:

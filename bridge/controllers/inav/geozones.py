@@ -6,6 +6,7 @@ They take effect after INAV's next start, and only with its feature GEOZONE (src
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import isfinite
 
 from bridge.controllers.inav.places import InavPlaceStore, take
@@ -36,7 +37,7 @@ from protocols.msp.inav_places import (
     encode_read_geozone,
     encode_read_vertex,
 )
-from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
+from reports.finding import DROPPED, News, RejectingFinding, reject, reject_list
 from reports.verdict import CLEARED_LIST, Result, Verdict
 
 _FIRST_VERSION = (8, 0, 0)
@@ -188,12 +189,19 @@ class FenceCheck(ListCheck):
         if not (isfinite(item.p1) and item.p1 >= _LEAST_CORNERS):
             return reject(MissionResult.INVALID_PARAM1, item, "p1", "a polygon has three corners or more")
         self._first = first = self._first or item
+        if corner in self._corners:
+            return reject(MissionResult.INVALID, item, "lat_e7", "a corner is there already: remove one")
         self._corners.append(corner)
         if len(self._corners) < item.p1:
             return None
-        corners, self._corners, self._first = _anticlockwise(self._corners), [], None
+        corners, self._corners, self._first = tuple(self._corners), [], None
         if _crosses_itself(corners):
             return reject(MissionResult.INVALID, first, "command", "sides cross: move a corner")
+        if not (area := _area(corners)):
+            return reject(MissionResult.INVALID, first, "command", "corners on one line: move a corner")
+        if area < 0:
+            # INAV's way around a zone needs them anticlockwise.
+            corners = (corners[0], *reversed(corners[1:]))
         return self._add(first, Geozone(0, _POLYGONS[Command(item.command)], corners))
 
     def _add(self, item: MissionItem, zone: Geozone) -> RejectingFinding | None:
@@ -235,9 +243,6 @@ class FenceCheck(ListCheck):
         elif zones != self._rules.current:
             self._say("INAV uses its new geozones after its next start", News.NOTICE)
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, zones, fence_items(zones), tuple(self._findings))
-
-    def _say(self, text: str, news: News = News.WARNING) -> None:
-        self._findings.append(Finding(None, "count", None, None, text, news=news))
 
 
 def fence_items(zones: Sequence[Geozone]) -> tuple[MissionItem, ...]:
@@ -285,10 +290,10 @@ def _divides(one: _Metres, other: _Metres, start: _Metres, end: _Metres) -> bool
     return sides[0] * sides[1] < 0
 
 
-def _anticlockwise(corners: Sequence[Corner]) -> tuple[Corner, ...]:
-    """In the order that INAV's way around a zone needs. The first corner stays the first."""
-    area = 0.0
-    for one, other in zip(corners, (*corners[1:], corners[0]), strict=True):
-        (north1, east1), (north2, east2) = (north_east_m(corners[0], each) for each in (one, other))
-        area += east1 * north2 - east2 * north1
-    return tuple(corners) if area > 0 else (corners[0], *reversed(corners[1:]))
+def _area(corners: Sequence[Corner]) -> int:
+    """Twice the area in squares of 1e-7 degrees: 0 if all corners are on one line, negative if they are clockwise."""
+    lat, lon = corners[0]
+    # The short way across the date line.
+    easts = ((each.lon_e7 - lon + 1_800_000_000) % 3_600_000_000 - 1_800_000_000 for each in corners)
+    places = zip((each.lat_e7 - lat for each in corners), easts, strict=True)
+    return sum(east1 * north2 - east2 * north1 for (north1, east1), (north2, east2) in pairwise(places))

@@ -41,7 +41,7 @@ from protocols.msp.inav_places import (
     encode_read_approach,
     encode_read_safehome,
 )
-from reports.finding import DROPPED, Finding, News, RejectingFinding, reject
+from reports.finding import DROPPED, News, RejectingFinding, reject
 from reports.verdict import CLEARED_LIST, RecordT, Result, Verdict
 
 _ACK_SIZE = 0
@@ -256,9 +256,6 @@ class RallyCheck(ListCheck):
                 empty = current.get(number, Safehome(number, False, 0, 0)).emptied()
                 filled[number] = _moved(empty, ahead.pop(0)) if ahead else empty
         return tuple(filled[number] for number in range(SAFEHOMES))
-
-    def _say(self, why: str, news: News) -> None:
-        self._findings.append(Finding(None, "count", None, None, why, news=news))
 
 
 def _moved(safehome: Safehome, place: tuple[int, int]) -> Safehome:

@@ -39,7 +39,7 @@ from protocols.float32 import is_single
 from protocols.mission_item import ROI_COMMANDS, Command, MissionItem, MissionResult
 from protocols.msp.nav import FLY_HOME, LAST, LEGS, TURNS, NavAction, NavRecord
 from protocols.msp.nav_items import GROUND_SPEED, home_item, item_seqs, items_from_records, sent_seqs
-from reports.finding import DROPPED, Finding, News, RejectingFinding, reject, reject_list
+from reports.finding import DROPPED, News, RejectingFinding, reject, reject_list
 from reports.verdict import Result, Verdict
 
 #: The greatest height at which single precision still resolves a centimetre.
@@ -273,7 +273,7 @@ class NavCheck(ListCheck):
         if lost := Counter(name for old in self._rules.current for name in _unshown(old)):
             names = ", ".join(f"{name} ({count})" for name, count in lost.items())
             why = f"Lost with the old list, as no MAVLink item can show it: {names}"
-            self._findings.append(Finding(None, "count", None, None, why, news=News.WARNING))
+            self._say(why)
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
         flight = self._path.facts(), self._path.shown(self._seqs), self._assumed

@@ -330,6 +330,7 @@ TRIALS: dict[Fault, Make] = {
     Fault.NO_ALTITUDE: without_altitude,
     Fault.NOT_A_PLACE: mission("a.kml", KML.format("0.0012, 51.4771, 15"), PATH),
     Fault.NO_KML: mission("a.kmz", zipped("a.txt"), PATH),
+    Fault.SAME_TITLES: mission("a.csv", TABLE.replace("altitude(m)", "latitude"), TABLE),
     Fault.UNEQUAL_ROW: mission("a.csv", TABLE.replace("51.4771", "51,4771"), TABLE),
     Fault.PLAN_VERSION: mission("a.plan", PLAN.replace('"version": 1', '"version": 7'), PLAN),
     Fault.NOT_A_PLAN: mission("a.plan", PLAN[:-3], PLAN),

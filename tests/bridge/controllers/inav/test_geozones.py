@@ -41,6 +41,8 @@ def test_corners_are_stored_anticlockwise_from_the_first() -> None:
         (polygon(Command.FENCE_POLYGON_INCLUSION, *((n, n * n) for n in range(127))), MissionResult.NO_SPACE),
         ([place(Command.FENCE_RETURN_POINT)], MissionResult.INVALID),
         (polygon(Command.FENCE_POLYGON_INCLUSION, (0, 0), (9, 9), (0, 9), (9, 0)), MissionResult.INVALID),
+        (polygon(Command.FENCE_POLYGON_INCLUSION, A, B, C, A), MissionResult.INVALID),
+        (polygon(Command.FENCE_POLYGON_INCLUSION, A, B, (0, 300)), MissionResult.INVALID),
     ],
 )
 def test_a_fence_that_does_not_fit_is_rejected(items: list[MissionItem], ack: MissionResult) -> None:
