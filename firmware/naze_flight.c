@@ -21,6 +21,9 @@ enum {
     TURNED_MS = 2000,
     STANDS_CM_S = 60,      /* a craft that brakes has come to a stop */
     SETTLED_CM_S = 50,
+    HASTY_CM_S = 150,      /* a landing that is faster over the ground waits, ... */
+    LOWEST_WAIT_CM = 100,  /* ... but not below this, ... */
+    WAIT_MS = 15000,       /* ... nor for longer */
     GROWS_CM = 50,         /* the distance grows: by this ... */
     JUMP_CM = 600,         /* a fix this far, and half a second's flight, from where the craft can be has jumped */
     GROWS_MS = 1000,       /* ... within this time */
@@ -174,6 +177,7 @@ static void enter(nf_t *f, const nf_input_t *in, nf_state_t state)
     f->entered_ms = f->mark_ms = in->now_ms;
     f->mark_cm = f->distance_cm;
     f->slow = 0;
+    f->waits = false;
     f->near_turn_ms = in->now_ms;
     f->allowed_ms = allowance(f, &nf_states[state]);
 }
@@ -535,6 +539,21 @@ static bool lands(const nf_t *f)
     return f->state == NF_DESCENT || f->state == NF_SINK;
 }
 
+static bool has_settled(const nf_t *f)
+{
+    return f->holding && st_speed(&f->steer) < (float)SETTLED_CM_S && f->distance_cm <= f->settings.radius_cm;
+}
+
+/* A gust must not carry the craft along the ground: the descent goes on when it has settled again. */
+static bool must_wait(const nf_t *f, const nf_input_t *in)
+{
+    if (!in->fix || in->battery_low || f->unsteered)
+        return false;
+    if (f->waits)
+        return !has_settled(f) && in->now_ms - f->mark_ms < WAIT_MS;
+    return in->height_cm > LOWEST_WAIT_CM && st_speed(&f->steer) > (float)HASTY_CM_S;
+}
+
 /* On the way home, or landing there, for failsafe, return-to-launch or the battery. */
 static bool homing(const nf_t *f)
 {
@@ -730,10 +749,15 @@ static void fly(nf_t *f, const nf_input_t *in)
         turn(f, in);
         break;
     case NF_SETTLE:
-        if (f->holding && st_speed(&f->steer) < (float)SETTLED_CM_S && f->distance_cm <= f->settings.radius_cm) {
+        if (has_settled(f)) {
             f->height_error_cm = -in->height_cm;
             enter(f, in, NF_DESCENT);
         }
+        break;
+    case NF_DESCENT:
+        if (!f->waits)
+            f->mark_ms = in->now_ms;
+        f->waits = must_wait(f, in);
         break;
     case NF_NO_FIX:
         if (in->fix)
@@ -758,7 +782,7 @@ static void fly(nf_t *f, const nf_input_t *in)
 
 static nf_mode_t mode_of(const nf_t *f, const nf_input_t *in)
 {
-    const nf_mode_t mode = nf_states[f->state].mode;
+    const nf_mode_t mode = f->waits ? NF_HOLD : nf_states[f->state].mode;
     return mode == NF_HOLD && (!in->flying || f->grounded) ? NF_GROUND : mode;
 }
 
@@ -850,7 +874,7 @@ static void steer(nf_t *f, const nf_input_t *in, nf_output_t *out)
     order.mode = steering(f, in, out->mode);
     order.way = way;
     order.cruise_cm_s = f->settings.speed_cm_s;
-    order.most_cd = f->settings.lean_cd;
+    order.most_cd = lands(f) && !f->waits ? within(f->settings.lean_cd, 0, NF_LANDING_CD) : f->settings.lean_cd;
     f->steering = order.mode;
     if (order.mode == ST_LEAN || (order.mode == ST_STOP && !in->fix))
         brake(f, in);

@@ -25,6 +25,9 @@
  *   Without a fix for `fix_s`, sticks untouched, it lands; a landing that has begun goes on without a fix. A place that the
  *   craft cannot have flown to is not believed: it flies on by its speed, and after NF_JUMP_MS holds where it is.
  *
+ *   A landing waits while the craft is fast over the ground, but not without a fix, with a low battery, or for
+ *   good: it always ends on the ground.
+ *
  *   No mission leaves the cylinder of `fence_m` and `height_m` around home: a list that would is not flown, and a craft that
  *   is outside by NF_OUTSIDE_M is held.
  *
@@ -70,6 +73,7 @@
 #define NF_JUMP_MS 2000u    /* a place that jumps is not believed for so long */
 #define NF_OUTSIDE_M 10     /* outside the cylinder by more is held */
 #define NF_BATTERY_MS 5000u /* the battery is low: for so long */
+#define NF_LANDING_CD 3000  /* greatest lean of a craft that sinks, 1/100 degree */
 #define NF_LEAD_CD 4500     /* the heading asked for is at most this far from the present one, 1/100 degree */
 
 /* A place, degrees * 1e7. */
@@ -275,6 +279,7 @@ typedef struct {
     bool adjusting;           /* climbing or descending */
     bool holding;             /* `target` is the place of a hold, or was flown to; else the craft brakes */
     bool unsteered;           /* a landing without a place */
+    bool waits;               /* NF_DESCENT: at this height, until the craft is slow over the ground */
     bool climbs_first;        /* NF_HOME: at `target`, before it flies home */
     uint8_t slow;             /* windows without progress */
     nf_record_t now;          /* the record in flight */

@@ -199,7 +199,7 @@ typedef struct {
     nf_place_t measured;
     vector_t measured_v;
     bool new_fix, aloft, flying, armed, crashed;
-    double lift_s, ground_s;
+    double lift_s, ground_s, seen_s; /* with a fix */
     int32_t correction_cd;          /* that the heading has */
 } craft_t;
 
@@ -289,10 +289,12 @@ static double lean_of_craft(void)
     return sqrt(craft.lean.n * craft.lean.n + craft.lean.e * craft.lean.e) * 180 / acos(-1);
 }
 
+/* A crash as in simulator/sky/body.py. A craft drifts, so it may be faster, without a fix, or if a take-off is stopped. */
 static void touch_down(const nf_output_t *out, double dt)
 {
+    const double most = out->mode == NF_LAND && craft.seen_s > 5 ? 300 : 800;
     const double speed = sqrt(craft.v.n * craft.v.n + craft.v.e * craft.v.e);
-    if (craft.aloft && craft.ground_s == 0 && (craft.climb < -250 || speed > 800 || lean_of_craft() > 35))
+    if (craft.aloft && craft.ground_s == 0 && (craft.climb < -250 || speed > most || lean_of_craft() > 35))
         craft.crashed = true;
     craft.height = 0;
     craft.ground_s += dt;
@@ -304,11 +306,12 @@ static void touch_down(const nf_output_t *out, double dt)
 static void move_craft(const nf_output_t *out)
 {
     const double dt = STEP_MS / 1000.0;
+    const double gusts = fmax(100, 0.2 * hypot(craft.wind.n, craft.wind.e));
     double climb = 0;
     craft.time_s += dt;
     craft.baro_cm = fmax(-100, fmin(100, craft.baro_cm + craft.lies.baro_cm_s * dt)); /* more flies a low list into the ground */
-    craft.gust.n += -craft.gust.n * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
-    craft.gust.e += -craft.gust.e * dt / 3 + noise() * 100 * sqrt(2 * dt / 3);
+    craft.gust.n += -craft.gust.n * dt / 3 + noise() * gusts * sqrt(2 * dt / 3);
+    craft.gust.e += -craft.gust.e * dt / 3 + noise() * gusts * sqrt(2 * dt / 3);
     switch (out->mode) {
     case NF_TAKEOFF:
         craft.lift_s += dt;
@@ -468,7 +471,8 @@ static void check_step(flight_t *flight)
     if (in->rtl || in->failsafe)
         CHECK(core->state == NF_OFF || core->reason == NF_RTL || core->reason == NF_FAILSAFE || core->reason == NF_BATTERY || in->stick || core->reason >= NF_AWAY || core->reason == NF_LAND_SLOW || core->state == NF_DESCENT || core->state == NF_SINK || before == NF_DESCENT || before == NF_SINK || flight->toggled);
     if (core->state == NF_DESCENT || core->state == NF_SINK)
-        CHECK(out->mode == NF_LAND);
+        CHECK(out->mode == (core->waits ? NF_HOLD : NF_LAND));
+    CHECK(!core->waits || (core->state == NF_DESCENT && in->fix && !in->battery_low));
     if (settings.fence_m && core->state >= NF_NEXT && core->state <= NF_STAY && craft.lies.jump_cm == 0 && craft.lies.drift_cm_s == 0)
         CHECK(hypot(craft.at.n, craft.at.e) < settings.fence_m * 100 + 1600);
     if (in->stick && !in->failsafe && before != NF_OFF)
@@ -552,6 +556,7 @@ static void sense(flight_t *flight)
     in->heading_cd = (int32_t)lround(remainder(craft.heading + heading_error(), 360) * 100);
     in->flying = craft.flying;
     in->armed = craft.armed;
+    craft.seen_s = in->fix ? craft.seen_s + STEP_MS / 1000.0 : 0;
 }
 
 static void step(flight_t *flight)
@@ -898,6 +903,78 @@ static void test_battery(void)
     settings.battery = NF_BATTERY_TOLD;
 }
 
+/* A craft of 0.5 kg in a wind that it stands with a lean of 22 degrees, 2.5 m above the ground in a landing. */
+static void begin_landing(flight_t *flight)
+{
+    nf_record_t record = random_record(WAYPOINT);
+    lies_t lies = honest;
+    lies.mass = 0.5;
+    lies.level = 0;
+    list.count = 0;
+    add(&record);
+    record.place = place_at(0, 0);
+    record.height_m = 6;
+    add(&record);
+    record.command = LAND;
+    add(&record);
+    prepare_with(flight, true, &lies);
+    craft.height = 600;
+    craft.at = (vector_t){0, 0};
+    craft.wind = (vector_t){800, 0};
+    go_on(flight, 1);
+    flight->in.switch_on = flight->toggled = true;
+    step(flight);
+    flight->toggled = false;
+    while (craft.height > 250) {
+        craft.gust = (vector_t){0, 0};
+        step(flight);
+    }
+    CHECK(flight->core.state == NF_DESCENT && flight->out.mode == NF_LAND);
+}
+
+/* A gust makes a landing wait until the craft is slow over the ground again. */
+static void test_landing_in_a_gust(void)
+{
+    static flight_t flight;
+    bool has_waited = false;
+    double speed = 0, lean = 0;
+    begin_landing(&flight);
+    for (int i = 0; i < 60000 / STEP_MS && craft.armed; i++) {
+        craft.gust = (vector_t){i < 5000 / STEP_MS ? 600 : 0, 0};
+        if (craft.height > 0) {
+            speed = hypot(craft.v.n, craft.v.e);
+            lean = lean_of_craft();
+        }
+        step(&flight);
+        has_waited = has_waited || flight.core.waits;
+    }
+    CHECK(speed < 150 && lean < 31);
+    CHECK(!craft.armed && has_waited);
+}
+
+/* A landing that waits ends on the ground all the same: without a fix, with a low battery, and in the end with both. */
+static void test_landing_ends(void)
+{
+    static flight_t flight;
+    for (int what = 0; what < 3; what++) {
+        begin_landing(&flight);
+        double waited_s = 0;
+        for (int i = 0; i < 200 * 1000 / STEP_MS && craft.armed; i++) {
+            craft.at = craft.gust = craft.mislevel = (vector_t){0, 0};
+            craft.v = (vector_t){200, 0}; /* for good */
+            step(&flight);
+            if (flight.core.waits)
+                waited_s += STEP_MS / 1000.0;
+            if (waited_s > 3 && what == 1)
+                flight.in.fix = false;
+            if (waited_s > 3 && what == 2)
+                flight.in.battery_low = true;
+        }
+        CHECK(!craft.armed && waited_s > 3);
+        CHECK(what ? waited_s < 4 : waited_s < 120);
+    }
+}
+
 /* The farthest from a place in the last half minute of two, m, or the fastest, m/s: steady wind, a compass that is off and not corrected. */
 static double stays_within(double mass, double lag_s, double compass, bool firm, st_mode_t mode)
 {
@@ -996,8 +1073,10 @@ static double stops_within(double mass, double wind_cm_s, double *farthest)
     flight.in.switch_on = flight.toggled = true;
     step(&flight);
     flight.toggled = false;
-    for (int i = 0; i < 400 && !(flight.core.holding && st_speed(&flight.core.steer) < 60); i++)
+    for (int i = 0; i < 400 && !(flight.core.holding && st_speed(&flight.core.steer) < 60); i++) {
+        craft.gust = (vector_t){0, 0};
         step(&flight);
+    }
     CHECK(flight.core.state == NF_HELD && flight.core.holding);
     const double stood = craft.at.n;
     *farthest = 0;
@@ -1088,6 +1167,8 @@ int main(int argc, char **argv)
     test_jump();
     test_fence();
     test_battery();
+    test_landing_in_a_gust();
+    test_landing_ends();
     test_margin();
     test_braking();
     test_takeoff_drift();

@@ -92,8 +92,7 @@ def test_a_mission_is_flown(
     pilot: Pilot, figure: Figure, number: int, compass: int, wind: float, kilograms: float
 ) -> None:
     records = LISTS[(number + number // 3) % 3]
-    # With 0.5 s the craft of 0.5 kg touches down too hard in 8 m/s: docs/mission-flight.md, weak points.
-    lag = 0.5 if compass == 45 and (wind, kilograms) != (8.0, 0.5) else 0.2 + 0.1 * (number % 3)
+    lag = 0.5 if compass == 45 else 0.2 + 0.1 * (number % 3)
     set_out(pilot, records, wind, kilograms, number, Lies(compass=compass * (-1) ** number, gps_lag=lag))
     run = fly_mission(pilot, records)
     results = judge(run, PLACE)

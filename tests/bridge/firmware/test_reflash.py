@@ -16,7 +16,7 @@ from bridge.firmware.reflash import (
     settings_in,
     start_boot_loader,
 )
-from protocols.stm32_boot_loader import PAGE_SIZE, Dialogue, start_program
+from protocols.stm32_boot_loader import Dialogue, start_program
 from simulator.board.options import SimOptions
 from simulator.board.simulated_board import Power
 from simulator.naze.board import SimulatedNaze
@@ -25,7 +25,9 @@ from tests.support.boot_loader_bench import CablePulledError, DialogueBench, boa
 from tests.support.naze_bench import BOOT_SECONDS
 
 _PAGES = 6
-PROGRAM = stand_in(patched=True) + random.Random(1).randbytes(_PAGES * PAGE_SIZE - 500)
+#: Bytes in a page of a medium-density STM32F103's flash (ST PM0075, 2.1).
+_PAGE = 1024
+PROGRAM = stand_in(patched=True) + random.Random(1).randbytes(_PAGES * _PAGE - 500)
 
 
 def quiet(_name: str, _done: int, _total: int) -> None:
@@ -125,7 +127,7 @@ def test_a_flash_that_keeps_failing_is_given_up() -> None:
     present = bench.run(read_flash(quiet))
     board.faults.flash_failures = 1000
     with pytest.raises(FlashingError, match="does not keep what is written at 0x08000000"):
-        bench.run(rewrite_flash(present, bytes(PAGE_SIZE) + present[PAGE_SIZE:], quiet))
+        bench.run(rewrite_flash(present, bytes(_PAGE) + present[_PAGE:], quiet))
 
 
 def booted() -> DialogueBench:
