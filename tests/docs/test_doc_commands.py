@@ -158,40 +158,45 @@ def sandbox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sandbox]:
         yield sandbox
 
 
-@pytest.mark.parametrize("command", OWN, ids=lambda command: command.text)
-def test_a_command_of_naze_bridge_works(sandbox: Sandbox, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_commands_of_naze_bridge_work(sandbox: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(sandbox.folder)
-    words = sandbox.redirected(command)
-    if not parse([*words]) or reason_not_to_run(command):
-        return
-    if words[0] == "run":
-        # A second daemon has its own folder and ports.
-        monkeypatch.setenv("XDG_STATE_HOME", str(sandbox.folder / "second"))
-        words += [] if "--fc" in words else ["--fc", str(sandbox.folder / "naze")]
-        words += [] if "--gcs" in words else ["--gcs", f"udpin:127.0.0.1:{free_port()}"]
-    code, output = sandbox.run(*words)
-    # Exit status 1: doctor found a problem of this machine, or the settings differ.
-    assert code == 0 or (code == 1 and {"doctor", "diff"} & {*words}), f"{command.place}: {output}"
+    for command in OWN:
+        words = sandbox.redirected(command)
+        if not parse([*words]) or reason_not_to_run(command):
+            continue
+        with monkeypatch.context() as environment:
+            if words[0] == "run":
+                # A second daemon has its own folder and ports.
+                environment.setenv("XDG_STATE_HOME", str(sandbox.folder / "second"))
+                words += [] if "--fc" in words else ["--fc", str(sandbox.folder / "naze")]
+                words += [] if "--gcs" in words else ["--gcs", f"udpin:127.0.0.1:{free_port()}"]
+            code, output = sandbox.run(*words)
+        # Exit status 1: doctor found a problem of this machine, or the settings differ.
+        assert code == 0 or (code == 1 and {"doctor", "diff"} & {*words}), f"{command.place}: {command.text}: {output}"
 
 
-@pytest.mark.parametrize("command", [each for each in COMMANDS if each not in OWN], ids=lambda command: command.text)
-def test_a_command_of_another_program_names_existing_files(command: Command) -> None:
-    assert reason_not_to_run(command), "run it, or add it to NOT_RUN"
+def test_the_commands_of_other_programs_name_existing_files() -> None:
+    for command in COMMANDS:
+        if command not in OWN:
+            assert reason_not_to_run(command), f"{command.place}: {command.text}: run it, or add it to NOT_RUN"
+            assert names_existing_files(command), f"{command.place}: {command.text}"
+
+
+def names_existing_files(command: Command) -> bool:
     program, *words = command.words
     if program == "make" and "~" not in command.text:
         folder = Path(REPOSITORY, words[words.index("-C") + 1]) if "-C" in words else REPOSITORY
         (target,) = (word for word in words if "=" not in word and word not in {"-C", folder.name})
-        assert re.search(rf"^{target}\b[^:=]*:(?!=)", (folder / "Makefile").read_text(), re.MULTILINE)
-    if words[0] == "-m" and program == "python":
-        assert find_spec(words[1])
-    for word in words:
-        if word.startswith("examples/"):
-            assert (REPOSITORY / word).exists()
-        if program in {"systemctl", "journalctl", "apt"} and word.startswith("naze"):
-            unit = word.replace("@*", "@")
-            assert (REPOSITORY / "systemd" / (unit if "." in unit else f"{unit}.service")).exists()
-        if program == "nmcli" and word.startswith("naze"):
-            assert word == CONNECTION
+        if not re.search(rf"^{target}\b[^:=]*:(?!=)", (folder / "Makefile").read_text(), re.MULTILINE):
+            return False
+    if words[0] == "-m" and program == "python" and not find_spec(words[1]):
+        return False
+    named = [REPOSITORY / word for word in words if word.startswith("examples/")]
+    ours = [word for word in words if word.startswith("naze")]
+    if program in {"systemctl", "journalctl", "apt"}:
+        units = [word.replace("@*", "@") for word in ours]
+        named += [REPOSITORY / "systemd" / (unit if "." in unit else f"{unit}.service") for unit in units]
+    return all(path.exists() for path in named) and (program != "nmcli" or {*ours} <= {CONNECTION})
 
 
 def test_every_exception_is_needed_and_the_test_exists() -> None:

@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-import pytest
 
 from service.cli.main import main
 from service.settings import Settings, load_settings
 from service.settings.addresses import parse_gcs
 from service.settings.load import CONFIG_VARIABLE
 from service.settings.table import KEYS
-from tests.support.doc_pages import PAGES, Block, blocks, place_of, spans
+from tests.support.doc_pages import PAGES, blocks, place_of, spans
 from tests.support.programs import REPOSITORY
 
 BLOCKS = [block for block in blocks() if block.language == "toml"]
@@ -40,22 +39,30 @@ def load(folder: Path, text: str) -> Settings:
     return load_settings(file, state_dir=folder)
 
 
-@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.place)
-def test_a_block_of_settings_is_valid(block: Block, tmp_path: Path) -> None:
-    assert load(tmp_path, block.text) != load(tmp_path, "")
+def test_blocks_of_settings_are_valid(tmp_path: Path) -> None:
+    for block in BLOCKS:
+        assert load(tmp_path, block.text) != load(tmp_path, ""), block.place
 
 
-@pytest.mark.parametrize("setting", SETTINGS)
-def test_a_setting_in_the_text_is_valid(setting: str, tmp_path: Path) -> None:
+def test_settings_in_the_text_are_valid(tmp_path: Path) -> None:
+    wrong = {}
+    for setting, place in SETTINGS.items():
+        try:
+            load(tmp_path, file_with(setting))
+        except ValueError as error:
+            wrong[setting] = place, error
+    assert wrong == {}
+
+
+def file_with(setting: str) -> str:
     name = setting.split()[0]
     if name in IN_A_TABLE:
-        load(tmp_path, IN_A_TABLE[name].format(setting))
-        return
+        return IN_A_TABLE[name].format(setting)
     tables = {key.name.rpartition(".")[0] for key in KEYS if key.name.rpartition(".")[2] == name}
     table = tables.pop() if len(tables) == 1 else "zenoh" if "[" in setting else "web"  # both have `listen`
     # Commands need authentication, which is in other settings.
     waived = 'commands_without_authentication = "I know"\n' if name in {"commands", "mavlink_in"} else ""
-    load(tmp_path, f"[{table}]\n{waived}{setting}" if table else setting)
+    return f"[{table}]\n{waived}{setting}" if table else setting
 
 
 def test_environment_variables_exist() -> None:
@@ -74,9 +81,10 @@ def options(command: click.Command) -> Iterator[str]:
                 yield from options(inner)
 
 
-@pytest.mark.parametrize(("span", "place"), OPTIONS)
-def test_an_option_in_the_text_exists(span: str, place: str) -> None:
-    option, _, value = span.partition(" ")
-    assert option.partition("=")[0] in {*options(main), "--json"} | OTHER_PROGRAMS, place
-    if option == "--gcs" and value:
-        parse_gcs(value.replace("ADDRESS", "192.168.4.20"))
+def test_options_in_the_text_exist() -> None:
+    known = {*options(main), "--json"} | OTHER_PROGRAMS
+    for span, place in OPTIONS:
+        option, _, value = span.partition(" ")
+        assert option.partition("=")[0] in known, f"{place}: {span}"
+        if option == "--gcs" and value:
+            parse_gcs(value.replace("ADDRESS", "192.168.4.20"))

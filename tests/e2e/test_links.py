@@ -10,7 +10,7 @@ from protocols.mission_item import MissionResult
 from tests.support.benches import Bench, Starter
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plain_station import PlainStation, tcp_station, udp_station
-from tests.support.plan import PlanRow, judge, plain_plan, records_of
+from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import TIMEOUT_S, Daemon, free_port, until
 
 PLAN = plain_plan(40)
@@ -28,17 +28,6 @@ def take_terminals(name: Path) -> list[int]:
     return taken
 
 
-def answer_requests(station: PlainStation, plan: list[PlanRow], until_seq: int | None = None) -> MissionResult | None:
-    """Send each requested item until `until_seq` is requested or the final ack arrives."""
-    while True:
-        message = station.wait_for("MISSION_REQUEST", "MISSION_ACK")
-        if message.get_type() == "MISSION_ACK":
-            return MissionResult(message.type)
-        if message.seq == until_seq:
-            return None
-        station.send_item(plan, message.seq)
-
-
 # -- the flight controller's side ----------------------------------------------------------------------------
 
 
@@ -51,7 +40,7 @@ def test_a_port_returns_under_another_name_behind_the_same_link(start: Starter, 
     daemon.wait()
     with udp_station(daemon.address) as station:
         station.send_heartbeat()
-        for number in range(3):
+        for number in range(2):
             name = by_id.resolve()
             board.set("unplug")
             until(partial(has_lost_port, daemon, number + 1), "the loss of the port")
@@ -72,7 +61,7 @@ def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> Non
     planner = bench.mission_planner()
     planner.wait_for_vehicle()
     planner.write(PLAN)
-    for _ in range(3):
+    for _ in range(2):
         planner.received.clear()
         bench.board.set("power off")
         bench.board.set("power on")
@@ -82,9 +71,6 @@ def test_a_ground_station_keeps_the_vehicle_through_a_reset(bench: Bench) -> Non
     bench.daemon.wait()
     planner.write(plain_plan(41))
     assert bench.board.records() == records_of(judge(plain_plan(41)))
-
-
-# -- ground stations that move -------------------------------------------------------------------------------
 
 
 # -- other kinds of links ------------------------------------------------------------------------------------

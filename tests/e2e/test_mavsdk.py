@@ -12,7 +12,6 @@ import pytest
 from mavsdk import ComponentType
 from mavsdk.asyncio import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
-from mavsdk.asyncio.plugins.mission.mission import MissionAsync, MissionError, MissionResult
 from mavsdk.asyncio.plugins.mission_raw import (
     MissionItem,
     MissionPlan,
@@ -152,20 +151,6 @@ async def test_a_refused_list_keeps_the_old_mission(shared: Bench) -> None:
         assert shared.board.records() == records_of(judge(plan))
 
 
-async def test_while_armed_the_mission_is_readable_and_not_writable(bench: Bench) -> None:
-    async with vehicle_at(bench.daemon.port) as vehicle:
-        missions = MissionRawAsync(vehicle)
-        plan = plain_plan(12, start=20)
-        await missions.upload_mission(raw_items(plan))
-        bench.board.set("armed 1")
-        async for armed in TelemetryAsync(vehicle).subscribe_armed():
-            if armed:
-                break
-        assert await refusal_of(missions, plain_plan(12)) == MissionRawResult.DENIED
-        assert len(await missions.download_mission()) == len(judge(plan).items)
-        assert bench.board.records() == records_of(judge(plan))
-
-
 async def test_fences_and_rally_points_are_refused_as_unsupported(shared: Bench, kept: list[str]) -> None:
     items = raw_items(plain_plan(4, start=20))
     async with vehicle_at(shared.daemon.port) as vehicle:
@@ -197,22 +182,6 @@ async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> Non
         assert len(await missions.download_mission()) == 1
 
 
-async def test_setting_the_current_item_ends_and_does_not_block_a_later_call(shared: Bench) -> None:
-    plan = plain_plan(4)
-    async with vehicle_at(shared.daemon.port) as vehicle:
-        missions = MissionRawAsync(vehicle)
-        await missions.upload_mission(raw_items(plan))
-        async for progress in missions.subscribe_mission_progress():
-            if progress.total == len(plan):
-                break
-        # Not while one is under way: MAVSDK would request again and forget its timeout.
-        await anext(MavlinkDirectAsync(vehicle).subscribe_message("MISSION_CURRENT"))
-        with pytest.raises(MissionRawError) as refused:
-            await missions.set_current_mission_item(2)
-        assert refused.value.result == MissionRawResult.TIMEOUT
-        assert len(await missions.download_mission()) == len(plan)
-
-
 async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     """MAVSDK joins the pieces of a STATUSTEXT with nothing in between: padding would be a gap."""
     texts: list[str] = []
@@ -230,15 +199,6 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
         "WP 6: Alt changed from 19.5 to 19 m (whole numbers only)",
         "WP 7: DO_SET_ROI_NONE dropped, no ROI from here on",
     ]
-
-
-async def test_the_mission_plugin_cannot_read_an_ardupilots_list(shared: Bench, kept: list[str]) -> None:
-    """It takes only waypoints of a relative frame, and home has frame 0; `mission_raw` reads the list."""
-    async with vehicle_at(shared.daemon.port) as vehicle:
-        with pytest.raises(MissionError) as refused:
-            await MissionAsync(vehicle).download_mission()
-        assert refused.value.result == MissionResult.UNSUPPORTED
-        assert len(await MissionRawAsync(vehicle).download_mission()) == len(kept)
 
 
 async def test_cancelling_keeps_the_old_list(shared: Bench, kept: list[str]) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The real DroneKit: its missions on an empty and on a full board.
 
-Its telemetry is tested in test_shown_telemetry.py; tests/scenarios/test_dronekit.py has a scripted client like it.
+Its telemetry is tested in test_shown_telemetry.py.
 """
 
 from collections.abc import Sequence

@@ -89,11 +89,6 @@ def long_push(fleet: Fleet, *options: str) -> Command:
     return command
 
 
-def the_push_ends_on_the_vehicle(fleet: Fleet) -> None:
-    records = records_of(judge(plain_plan(_COUNT)))
-    until(lambda: fleet.boards["snail"].records() == records, "the end of the push on the vehicle")
-
-
 def outcomes(ended: tuple[int, str, str]) -> dict[str, Any]:
     code, output, error = ended
     assert (code, error) == (1, ""), ended

@@ -186,8 +186,7 @@ def test_the_libraries_are_for_the_architecture_and_both_pythons(package: Path) 
         assert [each for each in libraries if f"cpython-{python.replace('.', '')}" in each.name]
 
 
-@pytest.mark.parametrize("architecture", _WHEEL_MACHINES)
-@pytest.mark.parametrize("python", [PYTHONS[0], PYTHONS[-1]])
+@pytest.mark.parametrize(("architecture", "python"), [("armhf", PYTHONS[0]), ("arm64", PYTHONS[-1])])
 def test_every_library_has_a_pinned_wheel(architecture: str, python: str, wheels: Path) -> None:
     before = set(wheels.iterdir())
     fetch(architecture, python, wheels)
@@ -304,6 +303,8 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     unit = root.run("cat /etc/systemd/system/multi-user.target.wants/naze-bridge-card.service")
     (started,) = re.findall("^ExecStart=(.*)$", unit, re.MULTILINE)
     start = started.replace("$$", "$")
+    if system == "bookworm":
+        return  # from here on the systems do not differ
     root.run(start, status=1)
     result = root.run("cat /boot/firmware/naze-bridge-RESULT.txt")
     assert "naze-bridge is not set up: opening the hotspot failed. The Pi tries again every 30 s" in result

@@ -31,7 +31,6 @@ pytestmark = pytest.mark.skipif(not os.environ.get("NAZE_FLY"), reason="NOT RUN:
 PLACE = Place()
 #: nf_t in harakiri_flight.c (link-time optimisation extends the name), and its first fields.
 _CORE, _PROGRESS = "flight", struct.Struct("<BBHH")
-_NONE = 0xFFFF
 _LATE_S = 1.0
 #: EXTENDED_SYS_STATE is sent once a second, and the board's report before it may be half a second old.
 _STATE_LATE_S = 1.5

@@ -195,7 +195,7 @@ def modes_of(board: str | TelemetryProtocol) -> tuple[tuple[int, int], ...]:
 
 
 @pytest.mark.parametrize("board", ALL)
-def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | TelemetryProtocol) -> None:
+def test_every_shown_value_is_true_in_flight(board: str | TelemetryProtocol) -> None:
     screen = on_the_ground(board)
     screen.fly(3)
     assert set(screen.shown) == set(SCREEN)
@@ -204,7 +204,7 @@ def test_every_shown_value_is_true_for_two_minutes_of_flight(board: str | Teleme
     screen.shown.clear()
     for boxes, mode in modes_of(board):
         screen.world.faults.boxes = boxes
-        screen.fly(40)
+        screen.fly(15)
         assert screen.heartbeat.custom_mode == mode
         assert screen.heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED
         home = screen.station.messages("HOME_POSITION")[-1]

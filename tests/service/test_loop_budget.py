@@ -112,7 +112,7 @@ def _datagrams() -> list[bytes]:
 
 async def udp(doors: Doors) -> None:
     for datagram in _datagrams():
-        await doors.udp_sends([datagram] * 4)
+        await doors.udp_sends([datagram] * 2)
         await doors.udp_sends([datagram[:size] for size in (1, 2, 3, 7, 13, 31, 64)])
 
 

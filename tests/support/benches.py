@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from tests.support.lossy_udp import LossyUdp
 from tests.support.mission_planner import MissionPlanner
@@ -23,9 +23,9 @@ class Bench:
     daemon: Daemon
     stack: ExitStack
 
-    def mission_planner(self, address: tuple[str, int] | None = None, **options: Any) -> MissionPlanner:
-        """A connected Mission Planner; `options` are the arguments of MissionPlanner."""
-        planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address, **options))
+    def mission_planner(self, address: tuple[str, int] | None = None) -> MissionPlanner:
+        """A connected Mission Planner."""
+        planner = self.stack.enter_context(MissionPlanner(address or self.daemon.address))
         planner.skip_connecting()
         return planner
 

@@ -6,8 +6,6 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from tests.support.mavlink_ground import MavlinkGround
 from tests.support.naze_bench import WireBench
 
-#: Longer than it takes to send all of them, one in 100 ms or so.
-LIST_S = 30.0
 _AUTOSENSE_S = 5.0
 _REAL32 = 9
 

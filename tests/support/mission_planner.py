@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mission Planner as a scripted client: its messages, waits and timeouts (docs/ground-stations.md).
 
-Only its behaviour on the link. Its timers may be scaled down (`pace`); everything else is as in the original,
-quirks included: any ack to MISSION_COUNT means "continue" to it, it understands only MISSION_REQUEST (40) while
-sending MISSION_ITEM_INT, and its loops take each other's packets (`own_loss`).
+Only its behaviour on the link, quirks included: any ack to MISSION_COUNT means "continue" to it, and it understands
+only MISSION_REQUEST (40) while sending MISSION_ITEM_INT.
 """
 
-import random
 import socket
 import time
 from collections import deque
@@ -46,30 +44,13 @@ class TimedOut(UploadFailed):
 
 
 class MissionPlanner:
-    """A ground station with a UDP client link to `address`; with `listen` it waits for the vehicle there instead.
+    """A ground station with a UDP client link to `address`; with `listen` it waits for the vehicle there instead."""
 
-    pace: factor on all of its timers. own_loss: probability that a packet is taken by a loop other than the one
-    waiting for it. mavlink_1_only: an old version, which never switches to MAVLink 2.
-    """
-
-    def __init__(
-        self,
-        address: tuple[str, int],
-        *,
-        listen: bool = False,
-        pace: float = 1.0,
-        own_loss: float = 0.0,
-        seed: float = 0,
-        mavlink_1_only: bool = False,
-    ) -> None:
+    def __init__(self, address: tuple[str, int], *, listen: bool = False) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if listen:
             self._socket.bind(address)
         self._peer = None if listen else address
-        self._pace = pace
-        self._own_loss = own_loss
-        self._random = random.Random(seed)
-        self._mavlink_1_only = mavlink_1_only
         self._sees_mavlink_2 = False
         self._codec = messages.MAVLink(None, srcSystem=SYSID, srcComponent=COMPID)
         self._codec.robust_parsing = True
@@ -104,17 +85,7 @@ class MissionPlanner:
 
     def send(self, message: Message) -> None:
         """Send in MAVLink 1 until the vehicle has shown MAVLink 2."""
-        self._send_bytes(self.next_frame(message))
-
-    def next_frame(self, message: Message) -> bytes:
-        """The frame of a message that is sent next."""
-        use_2 = self._sees_mavlink_2 and not self._mavlink_1_only
-        return bytes(message.pack(self._codec, force_mavlink1=not use_2))
-
-    def arrives_late(self, frame: bytes) -> None:
-        """A frame sent earlier, or its duplicate, arrives now."""
-        assert self._peer is not None
-        self._socket.sendto(frame, self._peer)
+        self._send_bytes(bytes(message.pack(self._codec, force_mavlink1=not self._sees_mavlink_2)))
 
     def _send_bytes(self, frame: bytes) -> None:
         self._codec.seq = (self._codec.seq + 1) % 256
@@ -129,8 +100,8 @@ class MissionPlanner:
         signing.secret_key, signing.sign_outgoing = None, False
 
     def _packets(self, seconds: float) -> Iterator[Message]:
-        """Yield the packets that reach the waiting loop within `seconds` of its own time."""
-        deadline = time.monotonic() + seconds * self._pace
+        """Yield the packets that reach the waiting loop within this time."""
+        deadline = time.monotonic() + seconds
         while True:
             while self._router:
                 yield self._router.popleft()
@@ -182,8 +153,7 @@ class MissionPlanner:
                 self._requested = message.seq
             case "MISSION_ACK" if self._is_for_me(message):
                 self._answer = MissionResult(message.type)
-        if self._random.random() >= self._own_loss:
-            self._router.append(message)
+        self._router.append(message)
 
     def _is_for_me(self, message: Message) -> bool:
         sender = (message.get_srcSystem(), message.get_srcComponent())
@@ -195,8 +165,8 @@ class MissionPlanner:
         return self.vehicle
 
     def listen(self, seconds: float) -> None:
-        """Only listen, for a time in real seconds."""
-        for _ in self._packets(seconds / self._pace):
+        """Only listen, for a time in seconds."""
+        for _ in self._packets(seconds):
             pass
 
     def joined_texts(self) -> str:
@@ -224,7 +194,7 @@ class MissionPlanner:
     def wait_for_vehicle(self) -> None:
         """Wait for two heartbeats of an autopilot's component 1; until then nothing is sent to a vehicle."""
         seen = 0
-        for message in self._packets(TIMEOUT_S / self._pace):
+        for message in self._packets(TIMEOUT_S):
             if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1 and message.type != 6:
                 seen += 1
                 self.vehicle = message.get_srcSystem(), message.get_srcComponent()
@@ -243,8 +213,7 @@ class MissionPlanner:
         self.wait_for_vehicle()
         for _ in range(2):
             self.send(m.MAVLink_statustext_message(6, b"Mission Planner"))
-        if not self._mavlink_1_only:
-            self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
+        self._send_signed(m.MAVLink_statustext_message(6, b"Mission Planner"))
         for _ in range(2):
             self.request_streams()
         self.command(m.MAV_CMD_REQUEST_MESSAGE, 148)
@@ -277,9 +246,6 @@ class MissionPlanner:
                     return result
         self.unacked_commands.append(command)
         return None
-
-    def arm(self) -> int | None:
-        return self.command(messages.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def read_hud(self) -> str:
         """The line on its HUD now."""

@@ -70,6 +70,9 @@ def test_other_programs_notations_are_accepted(text: str, meant: str) -> None:
         ("tcp:192.168.4.20:5760", "write tcpin:0.0.0.0:5760 to listen"),
         ("udpin", "use udpin:0.0.0.0:14550"),
         ("udpout:14550", "needs a host and a port"),
+        ("serial:/dev/ttyS0", "udpin:0.0.0.0:14550"),
+        ("udpin:0.0.0.0:mavlink", "not a port number"),
+        ("udpout:10.0.0.1:70000", "not a port number"),
         ("/dev/ttyUSB0", "lacks the radio's serial speed; add it, as in /dev/ttyUSB0,57600"),
     ],
 )
@@ -94,6 +97,23 @@ def test_ambiguous_connections_are_explained(text: str, words: str) -> None:
 )
 def test_other_programs_notations_of_flight_controllers_are_accepted(text: str, meant: str) -> None:
     assert str(parse_fc(text)) == meant
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("naze", "/dev/serial0"),
+        ("ttyUSB0,57600", "did you mean /dev/ttyUSB0,57600?"),
+        ("tcp:naze..local:5760", "not a host name"),
+        ("/dev/ttyUSB0,fast", "not a baud rate"),
+        ("/dev/ttyUSB0,12", "not a baud rate"),
+        ("tcp:naze.local", "needs a host and a port"),
+    ],
+)
+def test_a_wrong_flight_controllers_address_is_explained(text: str, words: str) -> None:
+    with pytest.raises(AddressError) as caught:
+        parse_fc(text)
+    assert words in str(caught.value)
 
 
 def test_ipv6_without_brackets_is_explained() -> None:

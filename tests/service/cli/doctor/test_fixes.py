@@ -15,7 +15,6 @@ from service.settings.load import SERVICE_STATE
 from tests.support.doctor import STATUS
 from tests.support.fixable_pi import FixablePi
 
-_DAEMON = ("python3", "/usr/bin/naze-bridge", "run")
 #: 14550 in /proc/net/udp, held by the socket 4711.
 _UDP_14550 = "   1: 00000000:38D6 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 4711 2 0 0\n"
 
