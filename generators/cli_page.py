@@ -19,7 +19,8 @@ _HEAD = """\
 
 
 def page() -> str:
-    return _HEAD + "".join(_line(name, context) for name, context in _commands(main))
+    lines = (_line(name, each) for name, each in _commands(main) if each.parent is None or not _is_group(each))
+    return _HEAD + "".join(lines)
 
 
 def helps(command: click.Command) -> Iterator[tuple[str, str]]:
@@ -42,12 +43,16 @@ def _commands(
                 yield from _commands(inner, f"{name} {each}", context)
 
 
+def _is_group(context: click.Context) -> bool:
+    return isinstance(context.command, click.Group)
+
+
 def _line(name: str, context: click.Context) -> str:
     """The command with its arguments, the first paragraph of its help, and the sentences about exit codes."""
     first, *others = re.split(r"\n\s*\n", (context.command.help or "").replace("\b", ""))
     exits = re.findall(r"Exit codes?\b.*?\.(?=\s|$)", " ".join(others), re.DOTALL)
     arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]
-    return f"- `{' '.join([name, *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"
+    return f"- `{' '.join([name.removeprefix('naze-bridge '), *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"
 
 
 if __name__ == "__main__":

@@ -65,6 +65,9 @@ FLIGHTS = {
     "INAV: landing of an aeroplane by an FW approach": "source: navigation/navigation.c:1848, fwAutolandApproachConfig",
     "INAV: aeroplane, rover and boat": "source: the lines in the second table of docs/inav.md",
 }
+_BOTH_WAYS = "flown with lists that keep the rule and lists that break it"
+_ONE_WAY = "flown only as the rule says"
+_NOT_FLOWN = "not flown, from INAV's source"
 #: Rules without flights of the opposite: these say how an item is flown, or that a board needs nothing.
 _AS_SHOWN = (
     "Harakiri: holds, turns, radii, the place and height of RETURN_TO_LAUNCH",
@@ -77,13 +80,12 @@ _AS_SHOWN = (
 
 
 def flights() -> str:
-    """What confirms each rule about the flight."""
-    rows = ""
+    """The rules about the flight, by how they were flown."""
+    by_ways: dict[str, list[str]] = {}
     for rule, by in FLIGHTS.items():
-        file, _, name = by.partition("::")
-        ways = "as shown" if rule in _AS_SHOWN else "both ways"
-        rows += f"| {rule} | {f'`{name}` in `{file}` | {ways}' if name else f'{by} | not flown'} |\n"
-    return f"| rule at Write | confirmed by | flown |\n|---|---|---|\n{rows}"
+        ways = _NOT_FLOWN if "::" not in by else _ONE_WAY if rule in _AS_SHOWN else _BOTH_WAYS
+        by_ways.setdefault(ways, []).append(f"  - {rule}\n")
+    return "".join(f"- {ways}:\n{''.join(rules)}" for ways, rules in by_ways.items())
 
 
 def table() -> str:
