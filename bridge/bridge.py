@@ -69,7 +69,7 @@ class Counters:
 
 
 class TimedPart(Protocol):
-    """A part with a timer. `tick` is called at `due` or later and sets the next `due`; infinity means no timer."""
+    """A part with a timer. `tick` is called at `due` or later and sets the next `due`, infinity without one."""
 
     @property
     def due(self) -> float:

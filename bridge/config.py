@@ -36,7 +36,7 @@ class BridgeSettings:
     ] = TAKEOFF_MAX_M
     pass_through: Annotated[
         PassThroughRule,
-        "Messages for an autopilot in pass-through from links with neither key_file nor writers: "
+        "Messages for an autopilot in pass-through from links without key_file or writers: "
         '"missions" (and parameters and requests), or "everything", including arming, modes, control and Set WP on an'
         " INAV.",
     ] = PassThroughRule.MISSIONS
@@ -44,7 +44,7 @@ class BridgeSettings:
 
 @dataclass(frozen=True, slots=True)
 class BridgeConfig:
-    """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it has no speed.
+    """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it lacks a speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
     `links`: access rules by link name. Every station may write over other links. `is_near`: True for an IP address on

@@ -5,7 +5,7 @@ A folder holds `members.json` (names, roles, system ids), `passwords.txt` (the r
 examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member. These name other
 files without a folder: payloads/endpoints.py finds them in its folder, zenohd in its working directory.
 
-A certificate cannot be revoked: zenoh reads no revocation lists (1.10). The router admits every certificate of the
+A certificate cannot be revoked: zenoh does not read revocation lists (1.10). The router admits every certificate of the
 fleet, but gives rights only to the names in its configuration, and an expelled name is never used again.
 """
 

@@ -75,12 +75,12 @@ class Trial:
 
     @property
     def is_held(self) -> bool | None:
-        """True if the vehicle holds the mission, by the checksum, or None if it gave no verdict."""
+        """True if the vehicle holds the mission, by the checksum, or None without a verdict."""
         return None if self.checksum is None else self.error is None and self.checksum == self.held
 
     @property
     def is_accepted(self) -> bool | None:
-        """True if the vehicle would accept the mission, or None if it gave no verdict."""
+        """True if the vehicle would accept the mission, or None without a verdict."""
         return None if self.checksum is None else self.error is None
 
 

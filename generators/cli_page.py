@@ -52,7 +52,8 @@ def _line(name: str, context: click.Context) -> str:
     first, *others = re.split(r"\n\s*\n", (context.command.help or "").replace("\b", ""))
     exits = re.findall(r"Exit codes?\b.*?\.(?=\s|$)", " ".join(others), re.DOTALL)
     arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]
-    return f"- `{' '.join([name.removeprefix('naze-bridge '), *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"
+    short = name.removeprefix("naze-bridge ")
+    return f"- `{' '.join([short, *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ class Payloads:
         return self._envelope(key, seq)
 
     def reply(self, key: ZenohKey, body: Json) -> bytes:
-        """Make the reply to a query: it has the number of the last sample. A command's reply has no head."""
+        """Make the reply to a query: it has the number of the last sample. A command's reply lacks the head."""
         if key in COMMAND_KEYS:
             return to_json(body).encode()
         seq = max(self._next.get(key.suffix, 0) - 1, 0)

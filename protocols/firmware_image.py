@@ -18,7 +18,7 @@ _HEX_DATA, _HEX_BASES = 0, {2: 4, 4: 16}
 
 
 class ImageError(Exception):
-    """The file has no image for this board; one sentence."""
+    """The file does not hold an image for this board, in a sentence."""
 
 
 def parse_image(data: bytes, name: str) -> bytes:

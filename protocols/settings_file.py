@@ -34,7 +34,7 @@ class SavedSettings(NamedTuple):
     """The values by name. A dump has texts, of a choice its name. A .param file has the number.
 
     board: the flight controller they are from, "" if the file lacks it. unread: the numbers of lines of a dump that are
-    no settings, or of a profile that is not selected, and their first word.
+    not settings, or of a profile that is not selected, and their first word.
     """
 
     values: Mapping[str, float | str]

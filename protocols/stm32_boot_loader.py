@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The boot loader in the ROM of an STM32F103, on USART1 with even parity (ST's application notes AN3155 and AN2606).
 
-A dialogue is a generator: it yields each Exchange with the board, and is sent the received bytes. The boot loader has
-no timeout: after an incomplete command it waits for the rest of it, which `synchronise` takes into account.
+A dialogue is a generator: it yields each Exchange with the board, and is sent the received bytes. The boot loader lacks
+a timeout: after an incomplete command it waits for the rest of it, which `synchronise` takes into account.
 
 >>> def chip() -> Dialogue[int]:
 ...     yield from synchronise(1.0)
@@ -58,7 +58,8 @@ def synchronise(within_s: float, is_waiting: Callable[[], None] = lambda: None) 
 
     INIT sets the speed after a reset. A boot loader that is in use takes it as a part of a command, whose rest the
     fillers complete with a wrong checksum. Before them INIT is sent only once: as a page number and the checksum, two
-    would erase the last page. Fillers alone could only erase page 0. `is_waiting` is called if nothing answers at once.
+    would erase the last page. Fillers alone could only erase page 0. `is_waiting` is called if there is no immediate
+    answer.
     """
     yield _bytes(bytes((INIT,)), 1, _INIT_S)
     if (yield from end_command()):
@@ -84,7 +85,7 @@ def read_chip_id() -> Dialogue[int]:
 
 
 def read_memory(address: int, size: int) -> Dialogue[bytes]:
-    """Up to BLOCK_SIZE bytes. They have no checksum."""
+    """Up to BLOCK_SIZE bytes. Without a checksum."""
     yield from _command(READ)
     yield from _step(_checked(address.to_bytes(4, "big")), READ)
     reply = yield from _step(_complemented(size - 1), READ, size)

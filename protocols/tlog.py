@@ -33,7 +33,7 @@ def tlog_records(frames: Iterable[bytes], at_us: int) -> bytes:
     Those that must not be logged are left out.
     """
     stamp = (at_us & ~_LINK_BITS).to_bytes(_STAMP_SIZE, "big")
-    # No call for most frames, of which there may be thousands a second: MAVLink 1 has neither signatures nor
+    # No call for most frames, of which there may be thousands a second: MAVLink 1 lacks signatures and
     # SETUP_SIGNING, and in MAVLink 2 they have flags (byte 2) or an id above 255 (byte 8).
     logged = [each if each[0] == MAGIC_V1 or not (each[2] or each[8]) else _loggable(each) for each in frames]
     return b"".join([stamp + each for each in logged if each])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Open the database file: check its integrity, make commits durable, create its tables.
 
-Every start checks for damage, because SD cards decay and lose power. A damaged file is neither repaired
-nor deleted: it is renamed so that `sqlite3` can still open it, and a new database takes its place. SQLite detects
+Every start checks for damage, because SD cards decay and lose power. A damaged file is renamed instead
+of repaired or deleted, so that `sqlite3` can still open it, and a new database takes its place. SQLite detects
 damaged page structures, but not a changed byte in a value: so every row has a checksum.
 """
 
@@ -80,7 +80,7 @@ def read_database(path: Path) -> sqlite3.Connection:
     except OSError as error:
         raise StoreError(f"{failure}: {reason(error)}") from error
     with explained(failure):
-        # Neither created nor changed: the file may be another user's.
+        # Not created or changed: the file may be another user's.
         connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=_READER_TIMEOUT_S)
         connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_VALUE)
         connection.execute("PRAGMA trusted_schema = OFF")

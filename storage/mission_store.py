@@ -115,7 +115,7 @@ class MissionStore:
         self.close()
 
     def close(self) -> None:
-        """Close the file; optional, as nothing is lost without it."""
+        """Close the file; optional: what was stored stays stored."""
         with explained(f"cannot close {self._path}"):
             self._connection.close()
 

@@ -39,7 +39,7 @@ class LazyCommand(NamedTuple):
 
 
 class LazyGroup(CommandGroup):
-    """A group given by a table, so that neither the list of commands nor completion imports them."""
+    """A group given by a table, so that listing and completing commands does not import them."""
 
     def __init__(self, *args: Any, commands: Mapping[str, LazyCommand], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

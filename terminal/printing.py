@@ -19,7 +19,7 @@ _BLANK_END = re.compile(r"(?: |\x1b\[[\d;]*m)+$", re.MULTILINE)
 
 
 def console(*, to_error: bool = False) -> "Console":
-    """The terminal, which takes texts as they are: markup in the name of a setting or a vehicle has no effect."""
+    """The terminal, which takes texts as they are: markup in the name of a setting or a vehicle is printed."""
     from rich.console import Console
 
     return Console(stderr=to_error, highlight=False, markup=False, emoji=False)

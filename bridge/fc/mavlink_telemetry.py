@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Readings of the vehicle from a flight controller's MAVLink.
 
-A passed-through autopilot may send thousands of frames a second that nothing here needs: the newest of each kind is
+A passed-through autopilot may send thousands of frames a second that are not needed here: the newest of each kind is
 kept as bytes until `settle`.
 """
 

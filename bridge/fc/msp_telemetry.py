@@ -91,7 +91,7 @@ def velocity(speed_m_s: float, course_deg: float | None) -> tuple[float | None, 
 
 
 def _altitude(vehicle: v.Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
-    """A board without a barometer answers zeros, which are no height."""
+    """A board without a barometer answers zeros, which are not heights."""
     reply, health = decode_altitude(payload), vehicle.last(v.Health)
     if reply is None or health is None:
         return
@@ -121,7 +121,7 @@ def hear_box_flags(vehicle: v.Vehicle, flags: int, controller: FlightController,
 
 
 def _analog(vehicle: v.Vehicle, payload: bytes, controller: FlightController, now: float) -> None:
-    """A voltage of 0 is not measured, nor is a current while none was drawn, nor a strength before the first signal."""
+    """A voltage of 0, a current before any charge, and a strength before the first signal are not measured."""
     reply = decode_analog(payload)
     if reply is None:
         return

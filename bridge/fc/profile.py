@@ -2,7 +2,7 @@
 """The profile of a flight controller, everything specific to one kind of board, and the questions that identify it.
 
 `bridge.controllers.table` lists the profiles. To add a flight controller, write the profile in its own file under
-`bridge/controllers/` and add it to that list. Nothing else asks what kind of board it is.
+`bridge/controllers/` and add it to that list. No other code asks what kind of board it is.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,7 +35,7 @@ _MAX_REPLY_PAYLOAD = 200
 
 
 class NoAnswer(Exception):
-    """A request got no reply, so the board cannot be identified: a guess could be wrong."""
+    """A request was not answered, so the board cannot be identified: a guess could be wrong."""
 
 
 class Interview:

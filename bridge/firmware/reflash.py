@@ -38,7 +38,7 @@ _BLANK = b"\xff"
 _START_SIZE = 8
 #: Opens the command line.
 _OPEN = b"\r\r\r"
-#: A calibration stops the main loop for longer, then the command line does not open, which does no harm.
+#: A calibration stops the main loop for longer, then the command line does not open, which is harmless.
 _OPEN_S = 5.0
 _DUMP_S = 5.0
 #: systemReset() waits for a second.

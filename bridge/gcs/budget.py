@@ -17,7 +17,7 @@ class Rate:
 
 
 class Cost(IntEnum):  # hashed for each datagram: as an int, in C
-    """The limited kinds of work. Two limits: for one address, and for all together that have no proven rights.
+    """The limited kinds of work. Two limits: for one address, and for all together without proven rights.
 
     RECEIVED: a datagram or a read from a connection. The total is for addresses that are not known yet.
     CONTACT: an address that is not known yet, which costs memory for some seconds. FAR_CONTACT: one behind a router, as

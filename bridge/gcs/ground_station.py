@@ -240,7 +240,7 @@ class GroundStation:
         self.outbox = outbox
         self.has_left = False
         self.access = access
-        #: None until a datagram was accepted: forged addresses must cost no memory.
+        #: None until a datagram was accepted: forged addresses must not use memory.
         self.budget = budget
         #: None once it is known that the station receives what is sent to its address.
         self.return_path: ReturnPath | None = None

@@ -42,7 +42,7 @@ class FrameRefusal(NamedTuple):
     """The reason for refusing a frame.
 
     `is_routine`: ground stations repeat it, so it is not reported. `is_forged`: the station has the key, but this frame
-    is not signed with it, or is a copy. It gets no answer and has no effect, not even on the time the station was last
+    is not signed with it, or is a copy. It is not answered and does not affect the time the station was last
     heard.
     """
 

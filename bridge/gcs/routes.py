@@ -14,7 +14,7 @@ from protocols.mavlink.codec import repack
 from protocols.mavlink.dialect import messages
 from protocols.mavlink.frame import MavlinkFrame, is_autopilot_heartbeat
 
-#: Messages remembered that have no target: all of one dialect from a few components.
+#: Messages remembered without a target: all of one dialect from a few components.
 _MAX_KINDS = 1024
 #: Carries a signing key in the clear. The guard refuses it from ground stations.
 _NEVER_FORWARDED = messages.MAVLINK_MSG_ID_SETUP_SIGNING
@@ -45,7 +45,7 @@ class Routes:
             self._send_alone(frame)
 
     def addressed(self, system: int, component: int = 0) -> tuple[int, int] | None:
-        """The ids on the autopilot's side of the component that a frame is for, or of the system; None: of neither."""
+        """The ids on the autopilot's side of the component that a frame is for, or of the system, else None."""
         there = (ids for ids in self._aboard if system in (0, ids[0]))
         return min(there, key=lambda ids: (ids[1] != component, ids), default=None)
 
@@ -74,7 +74,7 @@ class Routes:
         return [station for station in self._ground.everyone if station.rights.stations and is_there(station)]
 
     def _is_for_all(self, kind: bytes, frame: MavlinkFrame) -> bool:
-        """Meet a new kind of message from a component aboard, or True if it has no target field."""
+        """Meet a new kind of message from a component aboard, or True if it lacks a target field."""
         if frame.has_target_field:
             return False
         self._aboard.add(frame.sender)

@@ -46,7 +46,7 @@ class TimeLimit:
 class Send:
     """Send a request frame. `reply_size`: the size of the whole reply frame, bytes, for the bound on pending replies.
 
-    While an `exclusive` request is pending nothing else is sent: the flight controller may be writing flash.
+    An `exclusive` request must be answered before the next is sent: the flight controller may be writing flash.
     `is_kept`: the reply goes into the link's LastReplies. `may_wait`: the reply may be read a few ms late.
     """
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The request side of an MSP line: when a request may be sent, how long to wait, which replies are pending.
 
-Harakiri's send ring holds 255 bytes and has no overflow check, so the total size of pending replies is bounded. After
+Harakiri's send ring holds 255 bytes without an overflow check, so the total size of pending replies is bounded. After
 a stall a flight controller answers all requests at once, in order, so a request that timed out stays pending until a
 later one is answered. The timeout follows the measured round trip, as in TCP: 7/8 old + 1/8 measured, doubled on a
 loss.
@@ -50,8 +50,8 @@ _FOLLOW_UP_S = 0.04
 #: On Harakiri, which does not know the second command; other boards have larger rings.
 _REPLY_SIZES = {Msp.IDENT: 7 + FRAME_OVERHEAD, Msp.FC_VARIANT: FRAME_OVERHEAD}
 #: Fills a parser that waits for the rest of a cut frame (64 payload bytes and a checksum on an unpatched Harakiri),
-#: with whole harmless frames. Their order has no period: eleven times the same, read by a receiver at a twelfth of the
-#: speed, can come out as three '#' in a row (tests/bridge/fc/states/test_probe_at_wrong_speed.py).
+#: with whole harmless frames. Their order is not periodic: eleven times the same, read by a receiver at a twelfth of
+#: the speed, can come out as three '#' in a row (tests/bridge/fc/states/test_probe_at_wrong_speed.py).
 _RESYNC_COMMANDS = (
     *(Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT, Msp.FC_VARIANT, Msp.IDENT, Msp.IDENT),
     *(Msp.IDENT, Msp.IDENT, Msp.FC_VARIANT, Msp.FC_VARIANT, Msp.IDENT),
@@ -74,7 +74,7 @@ _MOST_REPLIES = 256
 
 
 def byte_time_s(baud: int | None) -> float:
-    """A byte's time on a line, with the start and stop bits, or 0 where the line has no speed."""
+    """A byte's time on a line, with the start and stop bits, or 0 on a line without a speed."""
     return 10 / baud if baud else 0.0
 
 
@@ -171,7 +171,7 @@ class _Request:
 
 
 class MspLink:
-    """One MSP line. `baud` is None where the line has no speed (TCP, the built-in simulator).
+    """One MSP line. `baud` is None on a line without a speed (TCP, the built-in simulator).
 
     >>> link.send(Send(request(Msp.IDENT), Msp.IDENT, reply_size=13), now)
     >>> replies = link.receive(port.read(512), now)  # and link.tick(now) at link.due
@@ -289,7 +289,7 @@ class MspLink:
 
     @property
     def due(self) -> float:
-        """The time of the next `tick`, or infinity while nothing is pending."""
+        """The time of the next `tick`, or infinity without a pending request."""
         return min(self._follow_up_at, *map(_DEADLINE, self._sent)) if self._sent else self._follow_up_at
 
     @property

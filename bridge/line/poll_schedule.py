@@ -40,8 +40,8 @@ _CURRENT_S = 1.0
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster polls needs fresh values.
 _MAY_WAIT_S = 0.08
-#: A poll's first lost reply reduces all rates by a tenth, and each received reply restores a little: 1 % losses change
-#: nothing, 10 % halve the rates.
+#: A poll's first lost reply reduces all rates by a tenth, and each received reply restores a little: 1 % losses have
+#: no effect, 10 % halve the rates.
 _LOSS_FACTOR = 0.9
 _RECOVERY = 0.005
 _WORST_QUALITY = 0.1
@@ -298,7 +298,7 @@ class PollSchedule:
             for slot in lost:
                 slot.is_asked = False
                 slot.misses += 1
-            # A poll that the board does not answer is not loss of the line, nor is another request.
+            # A poll or other request that the board does not answer is not a loss of the line.
             first = [slot for slot in lost if slot.misses == 1]
             self._quality = max(self._quality * _LOSS_FACTOR ** len(first), _WORST_QUALITY)
             self._beside_missions = beside_missions

@@ -69,7 +69,7 @@ class Runner:
         self._current: Task[Any] | None = None
         self._awaited: Receive | Pause | StoreEffect | EndSave | None = None
         self._begun: _BegunSave | None = None
-        #: The time of the next `tick`, or infinity while nothing is awaited.
+        #: The time of the next `tick`, or infinity without a pending request.
         self.due = inf
         self._busy = False
         #: True while requests of other programs wait for the line.

@@ -25,7 +25,7 @@ _ACKS = {"lat_e7": MissionResult.INVALID_PARAM5_X, "alt_m": MissionResult.INVALI
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The whole numbers from `low` to `high`. `instead_of_zero` is stored where 0 has no meaning."""
+    """The whole numbers from `low` to `high`. `instead_of_zero` is stored where 0 is meaningless."""
 
     low: int
     high: int
@@ -148,7 +148,7 @@ class ListCheck(ABC):
         return None
 
     def _no_position(self, item: MissionItem) -> None:
-        """An unused position is no news: QGroundControl sends one with each take-off."""
+        """An unused position is not reported: QGroundControl sends one with each take-off."""
         for name, value in (("lat_e7", item.lat_e7), ("lon_e7", item.lon_e7)):
             if value:
                 self._note(item, name, value, 0, UNUSED.why, News.NONE)
@@ -260,7 +260,7 @@ def refuse_frame(item: MissionItem, *, needs_position: bool) -> RejectingFinding
 
 
 def refuse_first(item: MissionItem) -> RejectingFinding:
-    """Item 0 is a command, so the list has no home."""
+    """Item 0 is a command, so the list lacks a home."""
     why = f"put home first, item 0 is {command_name(item.command)}"
     return reject(MissionResult.INVALID, item, "command", why)
 

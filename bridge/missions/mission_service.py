@@ -146,7 +146,7 @@ class MissionService:
         self.held: HeldMission | None = None
         #: The list as last verified before the link was lost: arming may change the protocol. Only of the same board.
         self._former: HeldMission | None = None
-        #: The craft was armed by then if nothing can have changed that list.
+        #: The craft was armed by then if that list cannot have changed.
         self._former_until = -inf
         #: Set while records are written and verified.
         self.writing: MissionTransfer | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fences and rally points: lists like missions, but the board's configuration holds them, and the Pi stores no copy."""
+"""Fences and rally points: lists like missions, but only the board's configuration holds them."""
 
 from collections.abc import Callable
 from functools import partial
@@ -30,7 +30,7 @@ class PlaceLists(MissionService):
         self.fc_store, self.are_stored = NO_PLACES, False
 
     def use(self, store: AnyFcMissionStore | Refusal, now: float, *, is_same_board: bool) -> None:
-        """Switch to another flight controller. The refusal for one that stores no such lists stays once it is lost."""
+        """Switch to another flight controller. After the loss of a board without such lists its refusal stays."""
         if isinstance(store, Refusal) and store is not NO_PLACES and not self.are_stored:
             store = NO_PLACES
         self.are_stored = store is not NO_PLACES

@@ -147,7 +147,7 @@ class Home:
 class FlightMemory:
     """An armed craft: what a bridge restarted in flight needs, because an armed flight controller may not report it.
 
-    A Harakiri that speaks MAVLink reports neither home nor the switch ranges that make its flight mode. Times are
+    A Harakiri that speaks MAVLink does not report home and the switch ranges that make its flight mode. Times are
     monotonic seconds, valid until the computer restarts.
 
     family: of the flight controller, as in Profile. armed_at: when it was armed, or first heard armed. mode: when the

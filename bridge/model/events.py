@@ -125,7 +125,7 @@ class GcsText(BridgeEvent):
 
 
 class ShareRefused(BridgeEvent):
-    """A program's request was refused, or got no answer in time. At debug level within 30 s of the one before."""
+    """A program's request was refused, or not answered in time. At debug level within 30 s of the one before."""
 
     name_in_log = "share.refused"
     level: Level = "warning"

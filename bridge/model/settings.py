@@ -61,7 +61,7 @@ class BoardSetting:
         return f"it is one of {', '.join(self.choices)}" if self.choices else f"it must be {self.range_text}"
 
     def parse(self, given: Value) -> Value | None:
-        """The value of this kind that a file or a person means: a number, or the name of a choice; None for neither."""
+        """The value of this kind that a file or a person means: a number, or the name of a choice, else None."""
         if self.kind is ValueKind.TEXT:
             return shown(given)
         if not isinstance(given, str):
@@ -108,7 +108,7 @@ class SettingTable:
         return len(self.settings)
 
     def find(self, name: str) -> BoardSetting | None:
-        """The setting of this name. Letters of the other case are accepted if they leave no doubt."""
+        """The setting of this name. Letters of the other case are accepted if they are unambiguous."""
         alike = [setting for setting in self if setting.name.lower() == name.lower()]
         return self.settings.get(name) or (alike[0] if len(alike) == 1 else None)
 

@@ -3,7 +3,7 @@
 
 Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
 metrics. Units are SI, angles are in degrees. None means unknown. Values that arrive together are one reading with its
-arrival time, and `Vehicle.fresh` alone decides whether it is current. A lost link clears nothing.
+arrival time, and `Vehicle.fresh` alone decides whether it is current. A lost link does not clear values.
 """
 
 from collections.abc import Mapping
@@ -289,7 +289,7 @@ class Vehicle:
         return last.mode if last is not None and isinstance(last.mode, FlightMode) else None
 
     def hear(self, reading: Reading) -> None:
-        """Store a reading in place of the previous one of the kind. A position that is no place is ignored."""
+        """Store a reading in place of the previous one of the kind. An impossible position is ignored."""
         kind = type(reading)
         if isinstance(reading, GlobalPosition) and not _is_place(reading.lat_e7, reading.lon_e7):
             return

@@ -2,7 +2,7 @@
 """The flight controller's settings for all clients: read, watched for changes without the bridge, changed and saved.
 
 They are read when the board is found, or when a client asks if reading disturbs the board, and again once a minute and
-after each change; only while it is disarmed and no mission needs the line. A reading that finds no change costs a few
+after each change; only while it is disarmed and no mission needs the line. A reading without changes costs a few
 requests. Changes are in the board's RAM until they are saved.
 """
 
@@ -88,7 +88,7 @@ class BoardSettings:
         return self.known.freshness >= Freshness.CHANGED and self._session.vehicle.armed is False
 
     def obstacle(self) -> SettingRefusal | None:
-        """The reason why settings can be neither read nor changed now, or None if they can."""
+        """The reason why settings cannot be read or changed now, or None if they can."""
         armed, missions = self._session.vehicle.armed, self._missions.fc_store
         if self._controller is None and isinstance(missions, Refusal):
             # It is lost, was never found, or calibrates.
@@ -118,7 +118,7 @@ class BoardSettings:
         self.due = now
 
     def arming_changed(self, now: float, *, is_armed: bool) -> None:
-        """A pilot who has armed has decided to fly: stations that connect later get no text about earlier changes."""
+        """A pilot who has armed has decided to fly: stations that connect later are not told of earlier changes."""
         if is_armed:
             self._tell_newcomers(None)
         else:

@@ -69,7 +69,7 @@ class KnownSettings:
             self.table = remembered_table(values)
 
     def may_have_changed(self, freshness: Freshness = Freshness.DOUBTFUL) -> None:
-        """The bridge, or a program through it, may have changed settings: the differences found next are no news."""
+        """The bridge, or a program through it, may have changed settings: the next differences are not reported."""
         self.freshness = min(self.freshness, freshness)
         self._is_ours, self.is_saved = True, False
         if self.board is not None:

@@ -47,7 +47,7 @@ class LeftOut:
 
 @dataclass(frozen=True, slots=True)
 class RestorePlan:
-    """notice: a warning, or empty if there is nothing to warn of."""
+    """notice: a warning, or empty."""
 
     changes: tuple[PlannedChange, ...]
     left_out: tuple[LeftOut, ...]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Answers MSP requests of other programs, from the last replies to the bridge itself or from the flight controller.
 
-A reply that is known costs no time on the line, in flight and during a mission transfer, too. The others are requested
+A known reply takes no line time, in flight and during a mission transfer, too. The others are requested
 one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part of the
 line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s its
 program is disconnected, because programs misread MSP's error reply: INAV Configurator mistakes it for success.
@@ -32,7 +32,7 @@ from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
 _CURRENT_S = 0.2
 #: An unanswered request occupies the line longer than any other: then no program uses it for a while.
 _PAUSE_AFTER_LOSS_S = 0.5
-#: The interval at which waiting requests are checked if nothing happens on the line.
+#: The interval at which waiting requests are checked on an idle line.
 _LOOK_AGAIN_S = 0.1
 #: Refused changes, and requests without a reply, are reported this often: programs repeat their attempts.
 _REPORTS = Rate(1 / 30, 1)
@@ -300,7 +300,7 @@ def right_of(frame: MspFrame, controller: FlightController) -> MspRight:
 
 
 def is_unknown_read(right: MspRight, frame: MspFrame) -> bool:
-    """True if this flight controller has no handler for a request that on every other firmware at most reads."""
+    """True if this flight controller does not handle a request that on every other firmware at most reads."""
     if right.effect is not Effect.UNKNOWN:
         return False
     elsewhere = [rights[frame.command] for rights in MSP_RIGHTS.values() if frame.command in rights]

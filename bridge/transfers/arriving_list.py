@@ -59,7 +59,7 @@ class ItemRequest:
         self.due = now + self._timeout_s
 
     def lost(self, now: float) -> None:
-        """No answer before `due`. The timeout grows if nothing was answered yet, or if many copies are lost."""
+        """No answer before `due`. The timeout grows before the first answer, or if many copies are lost."""
         if self._round_trip_s is None:
             self._timeout_s = min(self._timeout_s * 2, _SELDOM_S)
         else:

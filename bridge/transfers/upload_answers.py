@@ -32,11 +32,11 @@ class UploadAnswers:
     def __init__(self, ground: Ground, mission_type: int = 0) -> None:
         self._ground = ground
         self._mission_type = mission_type
-        #: True if the flight controller stores neither fences nor rally points.
+        #: True if the flight controller cannot store fences and rally points.
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
         self._again: list[tuple[Sender, FinalAck]] = []
-        #: The time of the next `tick`, or infinity if nothing is to be sent later.
+        #: The time of the next `tick`, or infinity if no answer is due.
         self.due = inf
 
     # At the end of an upload.

@@ -230,7 +230,7 @@ class Upload:
 
 
 class Fixed(Enum):
-    """An entry of the table that is no other state."""
+    """An entry of the table that is not a state."""
 
     #: The event cannot happen in this state: a bug.
     NEVER = auto()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A calibration from the start to the result, in the words that Mission Planner and QGroundControl wait for. Sans-IO.
 
-The firmware checks neither whether it is flying nor whether a command is repeated (serial.c): a calibration stalls it
+The firmware does not check whether it is flying or a command is repeated (serial.c): a calibration stalls it
 for seconds, a flash write for 0.1 s. So STATUS is read twice right before, and the command is sent once.
 
-No firmware reports the result over MSP. A Harakiri stores it and then restarts. It does nothing else meanwhile, so its
+No firmware reports the result over MSP. A Harakiri stores it and then restarts. It is busy meanwhile, so the
 silence is not reported as a loss.
 """
 

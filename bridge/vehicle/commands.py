@@ -77,7 +77,7 @@ _BUSY = Refusal(MissionResult.DENIED, sentences.SET_TOO_SOON())
 class SetWaypoint:
     """Set WP: the item that an armed craft flies to, on boards that have a request for that (INAV), one at a time.
 
-    Nothing else that a ground station sends changes a flight. It takes the right to move a passed-through autopilot,
+    No other message of a ground station changes a flight. It takes the right to move a passed-through autopilot,
     which a station on an open link does not have.
     """
 
@@ -166,7 +166,7 @@ class CommandService:
             self._calibration.take(sender, command, action, now)
 
     def set_current(self, sender: Sender, seq: int, now: float) -> None:
-        """MISSION_SET_CURRENT, which has no acknowledgement."""
+        """MISSION_SET_CURRENT, which is not acknowledged."""
         if self._set_waypoint.is_possible:
             self._set_waypoint.begin(sender, seq, lambda refusal: self._set(sender, refusal, now), now)
         else:

@@ -109,7 +109,7 @@ class Incoming:
             ),
             m.MAVLINK_MSG_ID_PARAM_SET: lambda s, msg, now: parameters.set(s, msg.param_id, msg.param_value, now),
             m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._refuse_file,
-            # There are none. Without an answer Mission Planner reads nothing else for 25 s.
+            # There are none. Without an answer Mission Planner waits for 25 s.
             m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: lambda s, _msg, _now: s.to(m.MAVLink_log_entry_message(0, 0, 0, 0, 0)),
             m.MAVLINK_MSG_ID_PING: self._ping,
             m.MAVLINK_MSG_ID_TIMESYNC: self._timesync,

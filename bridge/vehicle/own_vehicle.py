@@ -278,7 +278,7 @@ class OwnVehicle:
         vehicle, seq = self._session.vehicle, self._missions.seq_of(self.progress.number)
         if vehicle.last(MissionLeg) is None or vehicle.fresh(MissionLeg, now) is not None:
             return FlownMission(held.items, seq, self.progress.progress)
-        # Reading a long list leaves no time for polls: it still flies to that item.
+        # Reading a long list leaves too little time for polls: it still flies to that item.
         is_held = vehicle.fresh(MissionLeg, now, _SILENT_S) is not None
         return FlownMission(held.items, seq if is_held else 0)
 

@@ -3,8 +3,8 @@
 
 Heartbeat, SYS_STATUS, PreArm texts, refusals of transfers and commands, the status page and zenoh follow it.
 
-A craft that arms may change protocol and speed, and finding it again takes a second or two: such a silence changes no
-state. While SYS_STATUS has an unhealthy PREARM_CHECK, Mission Planner keeps the last PreArm text on the HUD.
+A craft that arms may change protocol and speed, and finding it again takes a second or two: such a silence does not
+change the state. While SYS_STATUS has an unhealthy PREARM_CHECK, Mission Planner keeps the last PreArm text on the HUD.
 QGroundControl removes it after 35 s, and reads each out loud.
 """
 

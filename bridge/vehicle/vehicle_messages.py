@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The MAVLink messages of the vehicle that the bridge represents (docs/telemetry.md).
 
-An unknown or stale value is sent as MAVLink's "unknown". A message whose fields have no such value is not made.
+An unknown or stale value is sent as MAVLink's "unknown". A message without such a value is not made.
 """
 
 import math
@@ -31,7 +31,7 @@ class _ModeNumbers(NamedTuple):
     standard: int = messages.MAV_STANDARD_MODE_NON_STANDARD
 
 
-#: An aeroplane's are those of INAV's own MAVLink (telemetry/mavlink.c), except for NAV COURSE HOLD, where INAV has no
+#: An aeroplane's are those of INAV's own MAVLink (telemetry/mavlink.c), except for NAV COURSE HOLD, which INAV does not
 #: number. Unless it navigates, a rover is steered by hand: MANUAL, 0; ArduRover's ACRO, 1, holds the course. Of modes
 #: with the same number, the first gives its name.
 _MODES = {
@@ -55,7 +55,7 @@ _ROVERS = (Airframe.ROVER, Airframe.BOAT)
 #: Without motor outputs Mission Planner shows a safety switch that is on.
 _MOTORS = messages.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 _PREARM = messages.MAV_SYS_STATUS_PREARM_CHECK
-#: There is no fence, but without this bit MAVProxy reports "fence breach".
+#: A fence does not exist, but without this bit MAVProxy reports "fence breach".
 _ALWAYS_HEALTHY = messages.MAV_SYS_STATUS_GEOFENCE
 
 _CAPABILITIES = (
@@ -84,7 +84,7 @@ T = TypeVar("T")
 
 
 class Unknown(Exception):
-    """A value is unknown or stale, and the message has no code for that, so it cannot be made."""
+    """A value is unknown or stale, which the message cannot express, so it cannot be made."""
 
 
 def known(value: T | None) -> T:
@@ -262,8 +262,8 @@ def gps_raw_int(at: Moment) -> Message:
 def global_position_int(at: Moment) -> Message:
     """GLOBAL_POSITION_INT: mm, cm/s, 0.01 degrees. Position, velocity and height have no "unknown".
 
-    Mission Planner shows no other height. So without a fix it carries the last known place, as ArduPilot's does, and
-    zeros if there was none, which Mission Planner and QGroundControl ignore.
+    Mission Planner does not show another height. So without a fix it carries the last known place, as ArduPilot's does,
+    and zeros if there was none, which Mission Planner and QGroundControl ignore.
     """
     height, place, orientation = at.need(v.Height), at.vehicle.last(v.GlobalPosition), at.fresh(v.Orientation)
     altitude_m, north_m_s, east_m_s = at.altitude_m(), 0.0, 0.0

@@ -63,7 +63,7 @@ def repack(frame: MavlinkFrame) -> Packed | None:
 def pack(message: Message) -> Packed:
     """Pack a message's fields, once for all receivers. struct.error if a value does not fit its field.
 
-    MAVLink 1 has no extension fields, and Mission Planner drops a frame of another size.
+    MAVLink 1 lacks extension fields, and Mission Planner drops a frame of another size.
     """
     if isinstance(message, Packed):
         return message
@@ -137,7 +137,7 @@ class FrameWriter:
         self._seq = 0
 
     def frame(self, packed: Packed, version: int) -> bytes:
-        """A frame of MAVLink 1 or 2. Always 2 if MAVLink 1 has no such message."""
+        """A frame of MAVLink 1 or 2. Always 2 if MAVLink 1 lacks the message."""
         seq, self._seq = self._seq, (self._seq + 1) & 0xFF
         msgid = packed.msgid
         if version == 1 and not packed.is_v2_only:

@@ -25,7 +25,7 @@ class MessageFormat(NamedTuple):
     """The name, checksum seed and layout of one kind of message. Sizes and places are in bytes of the payload.
 
     Sizes: `full_size` with extension fields. `base_size` without, as in MAVLink 1 (None: the id is above 255, so not in
-    MAVLink 1). Places: None if the message has no such field.
+    MAVLink 1). Places: None if the message lacks the field.
     """
 
     name: str

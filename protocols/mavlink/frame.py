@@ -25,7 +25,7 @@ _BASE_MODE, _SAFETY_ARMED = 6, 0x80
 
 _MAGIC = re.compile(rb"[\xfd\xfe]")
 #: CRC_EXTRA by header fields. MAVLink 2: by the message id's bytes. The payload may be shorter than the message,
-#: without trailing zeros, or longer, with newer extensions. MAVLink 1: by payload size and message id. It has no
+#: without trailing zeros, or longer, with newer extensions. MAVLink 1: by payload size and message id. It lacks
 #: extensions, but pymavlink sends them anyway, and mavlink's C parser accepts them.
 _CRC_EXTRA_V2 = {msgid.to_bytes(3, "little"): bytes((known.crc_extra,)) for msgid, known in MESSAGE_FORMATS.items()}
 _CRC_EXTRA_V1 = {
@@ -83,7 +83,7 @@ class MavlinkFrame:
 
     @property
     def target(self) -> tuple[int, int]:
-        """The target system and component. 0 means all: the message has no such field, or MAVLink 2 has omitted it."""
+        """The target system and component. 0 means all: the message lacks the field, or MAVLink 2 has omitted it."""
         raw = self.raw
         is_v2 = raw[0] == MAGIC_V2
         places = _TARGETS.get(raw[7:10] if is_v2 else raw[5:6])

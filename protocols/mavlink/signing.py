@@ -2,8 +2,8 @@
 """MAVLink 2 message signing (https://mavlink.io/en/guide/message_signing.html).
 
 A signed frame ends in 13 bytes: a link id, a timestamp of 48 bits in 10 us since 2015-01-01, and the first 6 bytes of
-the SHA-256 of key, frame, link id and timestamp. It authenticates the sender and prevents replays; nothing is
-encrypted.
+the SHA-256 of key, frame, link id and timestamp. It authenticates the sender and prevents replays, without
+encryption.
 """
 
 from collections.abc import Callable, Hashable

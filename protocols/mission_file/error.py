@@ -22,7 +22,7 @@ class MissionFileError(FileError):
 Note = Callable[[str], None]
 
 
-#: The note on a file of a kind that has no home, or lacks it.
+#: The note on a file without a home, by its kind or by mistake.
 NO_HOME = "the file has no home: the craft's position is used, or --home"
 
 

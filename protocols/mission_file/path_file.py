@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paths from other programs: KML and KMZ (Google Earth), GPX routes and tracks, CSV lists as Litchi writes them.
 
-The points become waypoints. Such a file has no home, and often no heights: then the reader asks for one, because a
+The points become waypoints. Such a file lacks a home, and often heights: then the reader asks for one, because a
 guessed height would be flown.
 """
 
@@ -25,7 +25,7 @@ _MAX_SIZE = 2 * 2**20
 _FEET = 0.3048
 #: What is compressed by other methods unpacks all at once, however large.
 _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-#: The frame of a height, by KML's altitudeMode. Heights of paths on the ground have no meaning.
+#: The frame of a height, by KML's altitudeMode. Heights of paths on the ground are meaningless.
 _KML_MODES = {"relativetoground": Frame.GLOBAL_TERRAIN_ALT, "absolute": Frame.GLOBAL}
 _CSV_LAT, _CSV_LON = ("latitude", "lat"), ("longitude", "lon", "lng", "long")
 _CSV_ALT = {"altitude(m)": 1.0, "altitude": 1.0, "alt": 1.0, "height": 1.0, "altitude(ft)": _FEET}

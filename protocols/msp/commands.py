@@ -5,7 +5,7 @@ from enum import IntEnum
 
 
 class Msp(IntEnum):
-    """Read requests. They do not change anything on the flight controller, and their frames contain no hazard byte."""
+    """Read requests. They do not change anything, and their frames are free of hazard bytes."""
 
     API_VERSION = 1
     FC_VARIANT = 2

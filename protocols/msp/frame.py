@@ -81,7 +81,7 @@ def frame_size(command: int, payload_size: int) -> int:
 
 
 def is_clean(frame: bytes) -> bool:
-    """True if `frame` contains no hazard byte, so that no run can form, not even across frames or after a loss."""
+    """True if `frame` is free of hazard bytes, so that no run can form, not even across frames or after a loss."""
     return HAZARDS.isdisjoint(frame)
 
 

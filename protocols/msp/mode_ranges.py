@@ -24,7 +24,7 @@ def ranges_text(payload: bytes, number: int) -> str:
 
 
 def range_writes(payload: bytes, number: int, text: str) -> list[bytes] | None:
-    """The payloads of SET_MODE_RANGE that give a mode these ranges, each complete; none that would change nothing.
+    """The payloads of SET_MODE_RANGE that give a mode these ranges, each complete; none that is already there.
 
     payload: the reply to MODE_RANGES. None if the board has too few ranges. ValueError for another form of text.
     """
@@ -60,7 +60,7 @@ def _slots(payload: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _is_of(held: bytes, number: int) -> bool:
-    """True if it is a range of this mode. An unused range has no width."""
+    """True if it is a range of this mode. An unused range is empty."""
     return held[0] == number and held[2] < held[3]
 
 

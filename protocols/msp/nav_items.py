@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts the records of INAV and MultiWii NAV to items for ground stations.
 
-A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records. Home (item 0) has no
-record.
+A leg's speed is shown as a DO_CHANGE_SPEED before it, so a list may have more items than records. Home (item 0) is not
+a record.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

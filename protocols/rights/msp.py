@@ -109,7 +109,7 @@ _OLD_CHANGES = _changes(
 _OLD_MOVES = _moves(SET_RAW_RC=200, SET_RAW_GPS=201)
 
 #: WP with another number is answered with a header and no payload. BOX has two bytes a box, or four with 5 or 6 aux
-#: channels. 209 (SET_WP) has no handler, and MISSION_INFO only one in the extension, which is recognised by it.
+#: channels. 209 (SET_WP) is not handled, and MISSION_INFO only one in the extension, which is recognised by it.
 _HARAKIRI: Rights = {
     **_OLD_READS, **_OLD_MOVES, **_OLD_CHANGES,
     **_reads(

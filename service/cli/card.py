@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge card`: prepares a freshly written Raspberry Pi OS card, so that the first start needs no terminal.
+"""`naze-bridge card`: prepares a new Raspberry Pi OS card for a first start without a terminal.
 
 It adds a folder to the boot partition and one line to what Raspberry Pi Imager left there for the first start: the
 script firstrun.sh (bookworm), or cloud-init's user-data (trixie). That line enables a unit, which installs the package,
@@ -188,7 +188,7 @@ def card(
 def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> str:
     """Add the folder and the hook. `options`: more of setup. `secrets`: by file name. It may be repeated.
 
-    Returns the checked properties of the package. CardError: this is no freshly written card. Nothing was changed.
+    Returns the checked properties of the package. CardError: this is not a freshly written card, and unchanged.
     """
     if not (boot / "cmdline.txt").exists() or not (boot / "config.txt").exists():
         raise CardError(

@@ -147,7 +147,7 @@ def _print_verdict(name: str, sent: Sequence[MissionItem], verdict: Verdict[Any]
 
 def _summary(sent: int, verdict: Verdict[Any]) -> str:
     if verdict.result is not Result.ACCEPTED:
-        # A single item of zeros (MAVSDK's clear) has no findings.
+        # A single item of zeros (MAVSDK's clear) is without findings.
         why = verdict.findings[-1].text() if verdict.findings else "Mission erased: one item of zeros"
         return f"MAV_MISSION_{verdict.ack.name}, {why}"
     dropped = sum(finding.becomes == DROPPED for finding in verdict.findings)

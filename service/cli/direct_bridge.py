@@ -39,8 +39,8 @@ async def ask_directly(
 ) -> Json:
     """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
 
-    `state_dir`: for backups of firmware. `even_silent`: a port without a flight controller is no error. The status has
-    the number of bytes received.
+    `state_dir`: for backups of firmware. `even_silent`: a port without a flight controller is not an error. The status
+    has the number of bytes received.
 
     If cancelled, a push is aborted, and Interrupted says how it ended.
     """

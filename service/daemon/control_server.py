@@ -77,7 +77,7 @@ class ControlServer:
             raise ControlError(f"{text}; name a writable folder with --state-dir") from error
 
     async def close(self) -> None:
-        """Stop listening, and tell waiting clients that they get no reply."""
+        """Stop listening, and fail the requests of waiting clients."""
         if self._server is not None:
             self._server.close()
             with suppress(OSError):  # in a folder that became read-only it stays, and the next start replaces it

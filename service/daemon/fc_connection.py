@@ -208,7 +208,7 @@ class FcPort:
     def _read(self, now: float) -> None:
         try:
             data = os.read(self._descriptor, _READ_SIZE)
-        except BlockingIOError:  # after a delay: nothing has arrived
+        except BlockingIOError:  # after a delay without input
             return
         except OSError as error:
             self._shut(reason(error))

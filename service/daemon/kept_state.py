@@ -25,7 +25,7 @@ class FlightFile:
     """Written on arming and disarming, and in flight when the mode changes. `port`: the flight controller's.
 
     It counts only on the same port, since the same start of the computer, and 60 s after a stop. Without a `folder`
-    there is no memory.
+    it forgets.
     """
 
     def __init__(self, folder: Path | None, port: str, host: Host) -> None:
@@ -38,7 +38,7 @@ class FlightFile:
         if self._file is not None:
             self._saved = self._file.load(lambda kept: self._read(kept, now))
             if self._saved is not None:
-                # The next stop may be a crash, which leaves no time.
+                # The next stop may be a crash, without time to write.
                 self._save(None)
         return self._saved
 

@@ -34,7 +34,7 @@ _log = structlog.get_logger()
 
 
 class SerialLink:
-    """One peer. The bytes are sent no faster than the port's rate. The port is reopened whenever it comes back."""
+    """One peer. The bytes are sent at most at the port's rate. The port is reopened whenever it comes back."""
 
     def __init__(self, address: GcsAddress, events: GcsEvents) -> None:
         self.name = str(address)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The keys of a daemon's links, and their signing timestamps, which survive a restart.
 
-A Pi has no battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
+A Pi lacks a battery-backed clock: after a reboot its time may be a day behind. New signatures would then reuse old
 timestamps, and recorded signatures would be accepted. So the last timestamp is kept in a file. To spare the SD card, it
 runs 10 s ahead. A clean stop writes the true value. After a power cut the timestamps heard since the last write are
 unknown, but all are below the file's: nothing up to that time is accepted any more, also after another restart.
@@ -28,7 +28,7 @@ _LOOK_S = 1.0
 
 
 class SigningState:
-    """Makes the `links` that a bridge guards. Nothing is kept without a `state_dir`, or without any key."""
+    """Makes the `links` that a bridge guards. Without a `state_dir` or any key they are not kept."""
 
     def __init__(
         self,

@@ -43,7 +43,7 @@ _SUBJECTS = {
     "web": "Status page",
 }
 _UNITS = {"baud": "baud", "s": "s", "m": "m", "mb": "MB"}
-#: Facts that need no name, in this order before the others.
+#: Facts without names, in this order before the others.
 _PLAIN_FACTS = ("text", "detail", "why", "what")
 _UNSAID = (*_PLAIN_FACTS, "event", "level", "exception")
 

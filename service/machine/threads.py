@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Threads alongside the event loop: the way back to it, and a thread for disks and name servers, which may hang.
 
-Neither the event loop nor the end of the process waits for them. (Both wait for asyncio's own threads.)
+The event loop and the end of the process do not wait for them. (Both wait for asyncio's own threads.)
 """
 
 import asyncio

@@ -29,7 +29,7 @@ def most_bits(passphrase: str) -> float:
     """An upper bound of a passphrase's entropy: words and names that a person chose have far less.
 
     Each character counts with the classes of characters in use, but not if it repeats or continues the one before
-    ("aa", "ab", "21"), nor if both have already followed each other ("qwertqwert").
+    ("aa", "ab", "21"), or if both have already followed each other ("qwertqwert").
     """
     known = "".join(each for each in _CLASSES if not set(each).isdisjoint(passphrase))
     choices = len(known) + (_OTHERS if any(each not in known for each in passphrase) else 0)

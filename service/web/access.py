@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The check of every request, and the security headers of every response.
 
-Reading needs no token, so another site's page must not read through the pilot's browser: under its own name resolved
-to our address (DNS rebinding), or in a frame. The check of the Host header and the response headers prevent that.
-Everything else needs the token in a header, which no other site can make a browser send.
+Reading works without a token, so another site's page must not read through the pilot's browser: under its own name
+resolved to our address (DNS rebinding), or in a frame. The check of the Host header and the response headers prevent
+that. Everything else needs the token in a header, which no other site can make a browser send.
 """
 
 import ipaddress

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits the connections to the status page, so that hostile browsers affect neither the flight controller nor others.
+"""Limits the connections to the status page, so that hostile browsers do not affect the flight controller or others.
 
 A connection carries one request and is closed after a few seconds. If there are too many, the address with the most
 connections loses the oldest of them. Requests take turns between addresses, so many hosts cannot keep the page from

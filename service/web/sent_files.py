@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files sent by the browser: firmware, and missions, checked by the rules of the current flight controller or written.
 
-The check needs no token, because it changes nothing. It costs the flight controller one request and this machine some
+The check works without a token, because it is a read. It costs the flight controller one request and this machine some
 milliseconds, so checks run one at a time with a pause after each.
 """
 

@@ -48,7 +48,7 @@ class MavlinkLink:
             self._publisher.put_raw(MAVLINK_OUT, data)
 
     def close(self) -> None:
-        """Nothing to do: the session undeclares everything."""
+        """The session undeclares everything."""
 
     def _arrived(self, sample: zenoh.Sample) -> None:
         if self._waiting < _MAX_WAITING and len(sample.payload) <= _MAX_BYTES:

@@ -106,7 +106,7 @@ class Queries:
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
 
     async def close(self) -> None:
-        """Tell waiting clients that they get no reply."""
+        """Fail the queries of waiting clients."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -26,7 +26,7 @@ _DIAGNOSIS_S = 5.0
 class JobKind(Enum):
     """The number of jobs that may wait before one of this kind.
 
-    A flood of guests' queries must displace neither commands' replies nor reports.
+    A flood of guests' queries must not displace commands' replies and reports.
     """
 
     SAMPLE = 256

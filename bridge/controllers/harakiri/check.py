@@ -276,7 +276,7 @@ class HarakiriCheck(ListCheck):
         lat_e7, lon_e7 = (item.lat_e7 or 0, item.lon_e7 or 0) if rule.position else (0, 0)
         is_raised = rule.height is CRUISE and (not math.isfinite(item.alt_m) or math.trunc(item.alt_m) == 0)
         p1 = self._fit(item, "p1", rule.p1)
-        # Filled-in defaults are not reported, nor is the radius of home, which is not flown to.
+        # Filled-in defaults and the radius of home are not reported: home is not flown to.
         p2 = self._fit(
             item, "p2", rule.p2, News.NOTICE if item.seq and item.p2 and not math.isnan(item.p2) else News.NONE
         )
@@ -288,7 +288,7 @@ class HarakiriCheck(ListCheck):
         if is_raised and rule.record is WpCommand.RETURN_TO_LAUNCH:
             height_m = self._raise_return(item)
         else:
-            # A home of height 0 is no news: QGroundControl sends it without terrain data.
+            # A home of height 0 is not reported: QGroundControl sends it without terrain data.
             news = News.NOTICE if not is_raised else News.WARNING if item.seq else News.NONE
             height_m = self._fit(item, "alt_m", rule.height, news)
         has_turns = rule.record is WpCommand.LOITER_TURNS
@@ -310,7 +310,7 @@ class HarakiriCheck(ListCheck):
         )
 
     def _raise_return(self, item: MissionItem) -> int:
-        """QGroundControl's Return item has no altitude at all."""
+        """QGroundControl's Return item lacks an altitude."""
         lowest_m = CRUISE.instead_of_zero
         why = f"RTL home at {lowest_m} m: set Alt, or a WP at home"
         self._note(item, "alt_m", given(item.alt_m), lowest_m, why, News.DANGER)

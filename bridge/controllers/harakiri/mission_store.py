@@ -282,7 +282,7 @@ def _again(status: ReplyStatus) -> PushFailed:
 
 
 class HarakiriArmedMissions(HarakiriMissions):
-    """A Harakiri that speaks MAVLink, because it is armed: the list is neither read nor written."""
+    """A Harakiri that speaks MAVLink, because it is armed: the list cannot be read or written."""
 
     def __init__(self, _board: FlightController, vehicle: Vehicle, settings: RuleSettings) -> None:
         self._vehicle = vehicle

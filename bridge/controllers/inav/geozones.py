@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's geozones as a fence: circles and polygons. Their heights and actions have no place in a fence's items.
+"""INAV's geozones as a fence: circles and polygons. A fence's items cannot carry heights and actions.
 
 They take effect after INAV's next start, and only with its feature GEOZONE (src/main/navigation/navigation_geozone.c).
 """

@@ -133,7 +133,7 @@ class InavLimits:
     unknown: tuple[str, ...] = ("nav_wp_max_safe_distance", "nav_max_altitude", "nav_rth_altitude")
 
     def with_settings(self, values: Mapping[str, float | str]) -> "InavLimits":
-        """With these settings. Raises ValueError for one that is neither a number nor one of its choices."""
+        """With these settings. Raises ValueError for a value that is not a number or a choice."""
         given = {name: _number(name, values[name]) for name in SETTING_NAMES if name in values}
         return replace(self, **given, unknown=tuple(name for name in self.unknown if name not in values))
 

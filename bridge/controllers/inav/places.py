@@ -2,9 +2,9 @@
 """INAV's safehomes, as rally points, and the store that geozones share with them: in RAM until INAV saves.
 
 The old places stay in its flash until the new places are read back equal. Otherwise the old places are written again.
-A safehome has no height, but an approach by which an aeroplane lands. Each MSP_SET_WP erases an approach: that of the
-mission whose number is the count of missions written since the boot, and after nine missions all of them, also those
-of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
+A safehome lacks a height, but has an approach by which an aeroplane lands. Each MSP_SET_WP erases an approach: that of
+the mission whose number is the count of missions written since the boot, and after nine missions all of them, also
+those of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
 """
 
 from abc import abstractmethod

@@ -25,7 +25,7 @@ def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure,
     """stop_m: INAV acts when the course over ground meets a border so far ahead, even if the leg ends before it."""
     blocked = [_blocks_arming(zones, place) for place in departure.places if place is not None]
     if blocked and blocked[0]:
-        # A list is rejected only if INAV would arm neither where the craft is nor at the list's home.
+        # A list is rejected only if INAV would not arm where the craft is or at the list's home.
         news = None if all(blocked) else News.DANGER
         yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", news)
     for zone in zones:

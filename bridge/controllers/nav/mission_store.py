@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes a list to INAV and MultiWii NAV (docs/inav.md): record by record, each read back before the next is sent.
 
-A reply to SET_WP does not mean that the record was stored, so only read-back counts. Nothing is sent to an armed
-flight controller: STATUS is requested before the first record and before the last, which makes the list flyable,
+A reply to SET_WP does not mean that the record was stored, so only read-back counts. An armed flight controller is not
+written to: STATUS is requested before the first record and before the last, which makes the list flyable,
 and watched in between.
 """
 
@@ -80,7 +80,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         return NavRules(self._profile, self._known or ())
 
     def items(self, records: Sequence[NavRecord], sent_as: Mapping[int, int]) -> tuple[MissionItem, ...]:
-        """A list as a ground station reads it. An empty one has no items, not even home."""
+        """A list as a ground station reads it. An empty list lacks even home."""
         return items_from_records(records, home_item(self._vehicle.place()), sent_as) if records else ()
 
     def refreshed(self, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
@@ -146,7 +146,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         """Make the list permanent after the last record. Raises PushFailed."""
 
     def _store_content(self, records: tuple[NavRecord, ...]) -> tuple[NavRecord, ...]:
-        """All records to write so that `records` are flown, and nothing else is lost."""
+        """All records to write so that `records` are flown, without further losses."""
         return records
 
     def _confirm(self, before: tuple[NavRecord, ...] | None) -> Conversation[tuple[NavRecord, ...] | None]:

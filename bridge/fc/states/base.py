@@ -130,7 +130,7 @@ class State(ABC):
     controller: FlightController | None = None
     #: While MSP is spoken.
     link: MspLink | None = None
-    #: True if the last bytes ended inside a frame and changed nothing: slow lines deliver a reply in pieces.
+    #: True if the last bytes ended inside a frame without a change: slow lines deliver a reply in pieces.
     is_mid_frame: bool = False
 
     def __init__(self, port: Port, event: Event, now: float) -> None:
@@ -170,7 +170,7 @@ class Closed(State):
         """Bytes that were read before the port closed: dropped."""
 
     def tick(self, now: float) -> Event | None:
-        """Nothing is due."""
+        """Without a timer."""
 
     @property
     def due(self) -> float:

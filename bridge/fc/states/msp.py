@@ -22,8 +22,8 @@ _FOREIGN_SIZE = 16
 _IDENTIFY_TIMEOUT_S = 15.0
 #: The speeds of Harakiri's telemetry while armed (tele_prot 3 and 1).
 _ARMED_SPEEDS = (57600, FRSKY_SPEED)
-#: A person may be typing into the command line: nothing is sent until it has been quiet for this long, and then once in
-#: this time. Two requests without an echo: the board is restarting, or has no power.
+#: A person may be typing into the command line: the bridge is silent until it has been quiet for this long, and then
+#: once in this time. Two requests without an echo: the board is restarting, or unpowered.
 _QUIET_S, _NO_ECHO_S = 3.0, 7.0
 
 
@@ -180,8 +180,8 @@ class Polling(MspLine):
 class Cli(State):
     """The board was left in its command line, or a terminal program opened it.
 
-    Sends only complete requests without a line end, and DEL, which erases them: so nothing precedes the pilot's `exit`,
-    and nothing is executed. A reply or a heartbeat shows that it is back.
+    Sends only complete requests without a line end, and DEL, which erases them: so the pilot's `exit` stays intact,
+    and none is executed. A reply or a heartbeat shows that it is back.
     """
 
     name = "command line"

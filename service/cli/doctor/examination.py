@@ -44,7 +44,7 @@ _ON_PORT = (check_permission, check_console)
 def examine(
     host: Host, settings: Settings, ask_running: Callable[[], Json], ask_port: Callable[[], Json]
 ) -> Iterator[Checked]:
-    """Yield the result of each check. The last listens to the port only if the others found no problem with it."""
+    """Yield the result of each check. The last listens to the port only if the others passed."""
     running = _status(ask_running)
     fc = settings.fc
     if isinstance(fc, AutoFc) and running is not None and running["port"] is None and running["where"] is not None:

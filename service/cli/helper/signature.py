@@ -45,7 +45,7 @@ def _tail(package: Path) -> bytes:
 def check_signature(package: Path, signers: Path) -> None:
     """Check the signature of a package, and remove it. Raises HelperRefusal if it is missing, or of no known key.
 
-    What is left is exactly what was signed. Nothing else reads the package before.
+    What is left is exactly what was signed. Only then is the package read.
     """
     tail = _tail(package)
     start = tail.rfind(_NAME)

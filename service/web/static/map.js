@@ -12,7 +12,7 @@ const placeOf = (item) => ({ lat: item.lat_e7 / 1e7, lon: item.lon_e7 / 1e7 });
 // items, path: of /api/held; flown: the seq of the one that is flown, or null. position, attitude: of /api/state.
 // trail: the track that was flown, [{lat, lon}]; decisions: what the board decided on it, [{lat, lon, text}].
 // camera: zoom (1: everything fits) and dx, dy in pixels.
-// Returns { svg, view, width, height }, or null if nothing has a position. view(place): its [x, y] in the picture.
+// Returns { svg, view, width, height }, or null without any position. view(place): its [x, y] in the picture.
 export function drawMap({ items, path, flown, position, attitude, trail, decisions = [] }, width, camera) {
   const placed = items.filter(isPlaced);
   const craft = position.lat_deg === null ? null : { lat: position.lat_deg, lon: position.lon_deg };

@@ -11,7 +11,7 @@ export class MapView {
   #tiles = new TileLayer();
   #canvas = make("div", { class: "map-canvas" });
   #tools;
-  #note = make("p", { class: "map-note", role: "status" }); // a finger sees no tooltips
+  #note = make("p", { class: "map-note", role: "status" }); // touch screens lack tooltips
   #contents = null;
   #drawn = "";
   #camera = { zoom: 1, dx: 0, dy: 0 }; // zoom 1: everything fits; dx, dy: pixels

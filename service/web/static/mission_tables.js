@@ -81,7 +81,7 @@ export function missionDetail(mission) {
   return [head, ...comparison(mission)];
 }
 
-// list: findings and rows, of a stored mission or of a checked file; defaults that were filled in are no findings.
+// list: findings and rows, of a stored mission or of a checked file; filled-in defaults are not findings.
 export function comparison(list) {
   const { findings, rows, rows_left_out: leftOut } = list;
   const notes = findings.length ? make("details", {}, make("summary", {}, `${findings.length} ${findings.length === 1 ? "note" : "notes"}`),

@@ -67,7 +67,7 @@ function showTransfer(transfer) {
   Object.assign(byId("transfer-bar"), { max: Math.max(total, 1), value: done });
 }
 
-// Growing ages are not announced, nor is the first state, which is on the page anyway.
+// Growing ages and the first state, which is on the page anyway, are not announced.
 function announce(names) {
   if (spoken !== null && names !== spoken) setText(byId("spoken"), names.toLowerCase());
   spoken = names;
