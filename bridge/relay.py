@@ -238,7 +238,7 @@ class _Unchecked(ListCheck):
 
 
 def _ignore(_event: BridgeEvent) -> None:
-    """The vehicle logs its own events."""
+    """The vehicle itself logs events."""
 
 
 class Relays:

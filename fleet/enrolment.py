@@ -3,7 +3,7 @@
 
 A folder holds `members.json` (names, roles, system ids), `passwords.txt` (the router's) or the certificates that
 examples/zenoh-tls/make_certificates.py makes, `router.json5`, and one `NAME.json5` for each member. These name other
-files without a folder: payloads/endpoints.py finds them in its folder, zenohd in its working directory.
+files without a folder: payloads/endpoints.py finds them in that folder, zenohd in the working directory.
 
 A certificate cannot be revoked: zenoh does not read revocation lists (1.10). The router admits every certificate of the
 fleet, but gives rights only to the names in its configuration, and an expelled name is never used again.
@@ -74,7 +74,7 @@ class Enrolled:
 
 @dataclass(frozen=True, slots=True)
 class FleetRouter:
-    """The router. `endpoint`: its address for members. `prefix`: the first part of the vehicles' keys."""
+    """The router. `endpoint`: the address for members. `prefix`: the first part of the vehicles' keys."""
 
     endpoint: str
     prefix: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vehicle of the fleet, made from its `overview` or its `state`."""
+"""A vehicle of the fleet, made from an `overview` or a `state`."""
 
 import re
 from collections import Counter

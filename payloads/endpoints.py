@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A zenoh configuration: the file, its endpoints, and why one rejects a session: zenoh reports only that it failed."""
+"""A zenoh configuration: the file, the endpoints, and why one rejects a session: zenoh reports only that it failed."""
 
 import json
 import os
@@ -73,7 +73,7 @@ def tls_files(config: zenoh.Config) -> TlsFiles:
 
 
 def in_short(error: Exception) -> str:
-    """An error of zenoh on one line, without the places in its source."""
+    """An error of zenoh on one line, without the places in zenoh's source."""
     text = " ".join(str(error).split())
     return text.split(" at /")[0].removesuffix(".")
 

@@ -112,7 +112,7 @@ def behind_home(items: Iterable[MissionItem], home: MissionItem) -> list[Mission
 
 
 class MissionRecord(Protocol):
-    """One record as a flight controller stores it. Its number is the position in the list."""
+    """One record as a flight controller stores it. The number is the position in the list."""
 
     def pack(self) -> bytes:
         """The bytes. Raises struct.error if a field does not fit, which is a bug in the caller."""

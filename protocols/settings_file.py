@@ -31,7 +31,7 @@ _SAVE = "save"
 
 
 class SavedSettings(NamedTuple):
-    """The values by name. A dump has texts, of a choice its name. A .param file has the number.
+    """The values by name. A dump has texts, of a choice the name. A .param file has the number.
 
     board: the flight controller they are from, "" if the file lacks it. unread: the numbers of lines of a dump that are
     not settings, or of a profile that is not selected, and their first word.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MultiWii 2.4 with navigation (docs/inav.md): each record goes to EEPROM at once, and the flag LAST ends the list.
 
-The record last read or written stays in RAM, and its p1 decides if a return home by the pilot's switch or by failsafe
+The record last read or written stays in RAM, and p1 decides if a return home by the pilot's switch or by failsafe
 lands there: after each conversation it is cleared, as after power-on.
 """
 
@@ -40,7 +40,7 @@ MULTIWII_CAPACITY = 178
 CURRENTS_PER_A = 10
 #: IDENT's capability bit of boards that fly missions.
 _NAV_CAPABILITY = 1 << 4
-#: A craft may stray this far from its line.
+#: A craft may stray this far from the line.
 _STRAYS_M = 5
 #: Flags of invalid records: a wrong checksum in EEPROM, and erased EEPROM.
 _NO_RECORD = (0xFE, 0xFF)
@@ -65,7 +65,7 @@ class LegLimits:
         return values if self.is_assumed else ()
 
     def return_cm(self, rth: NavRecord, _here_cm: int | None, _highest_cm: int) -> int | None:
-        """Its own RTH altitude is not known."""
+        """The board's RTH altitude is not known."""
         return rth.alt_cm or None
 
     def judge(self, _records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
@@ -90,7 +90,7 @@ USUAL_LEGS = LegLimits(radius_cm=100, stops_at_m=500, highest_m=100, is_assumed=
 def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
     return NavProfile(
         capacity,
-        # Its defaults; a board reports its own (NAV_CONFIG).
+        # The defaults, where a board does not report NAV_CONFIG.
         USUAL_LEGS,
         endless_hold=(NavAction.POSHOLD_UNLIM, 0),
         sea_level=False,

@@ -82,7 +82,7 @@ class TableReading:
 
 
 class FcSettings(ABC):
-    """The settings of one flight controller. Its conversations run while it is disarmed."""
+    """The settings of one flight controller. Conversations run while it is disarmed."""
 
     @abstractmethod
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:

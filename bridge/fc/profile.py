@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The profile of a flight controller, everything specific to one kind of board, and the questions that identify it.
 
-`bridge.controllers.table` lists the profiles. To add a flight controller, write the profile in its own file under
+`bridge.controllers.table` lists the profiles. To add a flight controller, write the profile in a new file under
 `bridge/controllers/` and add it to that list. No other code asks what kind of board it is.
 """
 

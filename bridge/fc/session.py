@@ -118,7 +118,7 @@ class FcSession:
             self._emit(FcInCommandLine(speed_baud=self.state.speed))
 
     def _leave(self, state: State, event: Event, now: float) -> None:
-        """Forget the flight controller and end its conversations."""
+        """Forget the flight controller and end the conversations with it."""
         self.state = Closed(self._port, event, now)
         self._port.output.clear()
         self._port.runner.link_down(now)

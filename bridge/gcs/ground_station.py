@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One ground station, from its arrival to its departure. Sans-IO."""
+"""One ground station, from arrival to departure. Sans-IO."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

@@ -89,7 +89,7 @@ class BeginSave:
 
 @dataclass(frozen=True, slots=True)
 class EndSave:
-    """Wait for the mission of the last BeginSave. Answer: its number, or None if that failed or timed out."""
+    """Wait for the mission of the last BeginSave. Answer: the mission's number, or None if that failed or timed out."""
 
 
 @dataclass(frozen=True, slots=True)

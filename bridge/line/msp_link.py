@@ -201,7 +201,7 @@ class MspLink:
         self._resync_due = False
         self._last_byte_at = now
         self.last_heard_at = now
-        #: From the flight controller's INFO, or 0 if its parser never gives up on a cut frame.
+        #: From the flight controller's INFO, or 0 if the parser never gives up on a cut frame.
         self.receiver_timeout_s = 0.0
         #: Set for boards that accept any byte inside a frame.
         self.any_byte = False

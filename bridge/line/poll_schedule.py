@@ -35,7 +35,7 @@ _FOLLOWED_S, _FOLLOWED_FOR_S = 0.1, 3.0
 #: A reply is current for one interval, or for this long.
 _CURRENT_S = 1.0
 #: Together with one that is due, polls are sent that will be due within this part of their interval, and this time:
-#: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of its
+#: every wake-up costs CPU time. For the same reason a poll that the line does not slow down is due at multiples of the
 #: interval: at the default rates all others join ATTITUDE.
 _EARLY, _EARLIEST_S = 0.2, 0.05
 #: Replies to polls with at least this interval may be read together. A client of faster polls needs fresh values.

@@ -98,7 +98,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
     reads_armed: bool = False
     #: How often to ask `is_current`, s.
     watch_s: float = 1.0
-    #: Further missions in its store, as last read. Only one mission at a time is loaded and flown.
+    #: Further missions on the board, as last read. Only one mission at a time is loaded and flown.
     others: tuple[tuple[RecordT, ...], ...] = ()
 
     @abstractmethod
@@ -135,7 +135,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
         return ""
 
     def settings_changed(self) -> None:
-        """The board's own settings may have changed: its rules may depend on them."""
+        """The board's own settings, on which the rules may depend, may have changed."""
 
     def load(self) -> Conversation[Loading]:
         """Make it load its saved mission if it holds none."""

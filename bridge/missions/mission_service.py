@@ -72,7 +72,7 @@ class MissionTransfer:
 
 @dataclass(frozen=True, slots=True)
 class DeliveryResult:
-    """The result of a mission. `number` is its number in the store, None if it could not be stored.
+    """The result of a mission. `number` is the number in the store, None if it could not be stored.
 
     `change`: makes the sentence for other ground stations about a change on the aircraft, from the name of the station
     that caused it, or None if there is no change.
@@ -365,7 +365,7 @@ class MissionService:
     def read_back(self) -> Conversation[HeldMission | Refusal]:
         """The flight controller's list. A cached copy is used only if the checksum is the same.
 
-        After connecting or an interrupted push, the flight controller first loads its saved mission if it holds none.
+        After connecting or an interrupted push, the flight controller first loads the saved mission if it holds none.
         """
         fc_store = self.fc_store
         if isinstance(fc_store, Refusal):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The craft as plain data: the kind, its flight mode, the battery, and the memory of a flight."""
+"""The craft as plain data: the kind, the flight mode, the battery, and the memory of a flight."""
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ ARM_BOX = "ARM"
 #: A flag of INAV and Betaflight: the receiver is silent, or the pilot's switch is on, and the failsafe procedure runs.
 FAILSAFE_BOX = "FAILSAFE"
 
-#: The thresholds of an aux channel's positions (MultiWii and its descendants).
+#: The thresholds of an aux channel's positions (MultiWii and descendants).
 _LOW_BELOW_US, _HIGH_ABOVE_US = 1300, 1700
 
 #: The boxes that fly the mission: Harakiri's, MultiWii NAV's and INAV's. Harakiri's is only the pilot's switch: a board

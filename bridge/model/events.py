@@ -11,7 +11,7 @@ Level = Literal["debug", "info", "warning", "error"]
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 @dataclass(frozen=True, kw_only=True)
 class BridgeEvent:
-    """An event. The log line has its name, its level, and the fields as facts, with the unit in the key.
+    """An event. The log line has the name, the level, and the fields as facts, with the unit in the key.
 
     >>> FcLost(why="no answer for 3 s", speed_baud=115200).facts()
     {'why': 'no answer for 3 s', 'speed_baud': 115200}
@@ -143,7 +143,7 @@ class UploadStarted(BridgeEvent):
 
 
 class UploadEnded(BridgeEvent):
-    """The final ack of a complete list is sent. `mission` is its number in the store."""
+    """The final ack of a complete list is sent. `mission` is the number in the store."""
 
     name_in_log = "mission.upload_ended"
     station: str

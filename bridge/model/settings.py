@@ -91,7 +91,7 @@ class BoardSetting:
 
 @dataclass(frozen=True, slots=True)
 class SettingTable:
-    """All settings of a board, in its own order.
+    """All settings of a board, in the board's order.
 
     is_complete: False if some could not be read. Their names are missing. is_remembered: True if only the values are
     known, from the last time.
@@ -136,7 +136,7 @@ def shown(value: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class BoardId:
-    """A flight controller. `kind`: its firmware and version. `uid`: its chip's number, in hex, or "" if it has none."""
+    """A flight controller. `kind`: firmware and version. `uid`: the chip's number, in hex, or "" if it has none."""
 
     kind: str
     uid: str = ""

@@ -35,7 +35,7 @@ class Freshness(IntEnum):
 
 
 class KnownSettings:
-    """The table as last read, its freshness, and the board that it belongs to."""
+    """The table as last read, the freshness, and the board that it belongs to."""
 
     def __init__(self, memory: SettingsMemory) -> None:
         self._memory = memory
@@ -46,7 +46,7 @@ class KnownSettings:
         self.board: BoardId | None = None
         #: The settings that were changed here, and not saved since.
         self.unsaved: dict[str, Value] = {}
-        #: True if the board's flash is known to hold the settings in its RAM.
+        #: True if the board's flash is known to hold the settings in RAM.
         self.is_saved = False
         #: None until the settings of a board were read. Those of a lost board stay.
         self.state: SettingsState | None = None

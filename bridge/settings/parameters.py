@@ -48,7 +48,7 @@ _ZERO = (
 )  # fmt: skip
 #: INAV's reasons not to arm.
 _NO_ACCELEROMETER, _NO_COMPASS = ARMING_BLOCKERS[13], ARMING_BLOCKERS[12]
-#: Mission Planner's name for the radius in its plan screen, in cm, and a Harakiri's setting.
+#: Mission Planner's name for the radius in the plan screen, in cm, and a Harakiri's setting.
 WP_RADIUS, _RADIUS = "WPNAV_RADIUS", "GPS_WP_RADIUS"
 #: 500 parameters a second for all lists together: a radio at 57600 baud carries as many.
 _EACH, _INTERVAL_S = 10, 0.02
@@ -199,7 +199,7 @@ class Parameters:
         self.was_refused = True
         cause = Cause.ARMED if refused is None else refused.cause
         if refused is not None:
-            # Each Write in Mission Planner sends the default radius of 30 m if its plan screen was open first.
+            # Each Write in Mission Planner sends the default radius of 30 m if the plan screen was open first.
             is_routine = name.upper() == WP_RADIUS and cause is Cause.OUT_OF_RANGE
             sender.say(Happening(sentences.RADIUS_KEPT, refused.why.values) if is_routine else refused.why)
         if name.upper() in self._values():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work on the board's settings: the change of one, or the save of all, from the request to its one answer.
+"""Work on the board's settings: the change of one, or the save of all, from the request to the answer.
 
 Parameters, restores, the status page, zenoh and the command line all use it.
 """
@@ -87,7 +87,7 @@ class SettingWork(ABC):
 
 @dataclass(eq=False)
 class SettingChange(SettingWork):
-    """Give a setting another value in the board's RAM. before: the setting, known at its turn."""
+    """Give a setting another value in the board's RAM. before: the setting, known when the change is next."""
 
     name: str = ""
     value: Value = 0.0

@@ -128,7 +128,7 @@ class MissionDownloads:
         sender.to(item_message(item, sender.sysid, sender.compid, kind, as_int=question.as_int))
 
     def _send_home(self, question: _Question) -> None:
-        """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner takes its ground level from it."""
+        """Item 0 while armed, at the altitude of HOME_POSITION: Mission Planner's ground level."""
         home = self._vehicle.home_or_position()
         item = self._missions.home_item() or self._home_item()
         if home is not None and home.altitude_m is not None:

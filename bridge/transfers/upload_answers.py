@@ -14,7 +14,7 @@ from bridge.voice.stations import Kind
 from protocols.mission_item import MissionResult
 from reports.verdict import Result, Verdict
 
-#: Mission Planner sends the last item for 5 s, its Cancel for 2.8 s.
+#: Mission Planner sends the last item for 5 s, a Cancel for 2.8 s.
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
 #: These never ask for the final ack again, so it is sent four times. Not later: QGroundControl's user takes 0.1 s to

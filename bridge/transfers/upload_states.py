@@ -99,7 +99,7 @@ class UploadState:
 
 
 class Waiting(UploadState):
-    """Another transfer runs. Mission Planner repeats its MISSION_COUNT for 2.8 s."""
+    """Another transfer runs. Mission Planner repeats MISSION_COUNT for 2.8 s."""
 
     seconds = 2.5
     timeout = OCCUPIED

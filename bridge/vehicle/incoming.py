@@ -168,7 +168,7 @@ class Incoming:
             recorded.append(frame.raw)
 
     def _pass_on(self, routes: Routes, sender: Sender, frame: MavlinkFrame, effect: Effect) -> None:
-        """Send a frame on to its targets, within its sender's rights."""
+        """Forward a frame to the targets, within the sender's rights."""
         station = sender.station
         if not station.allows(Cost.PASSED) or routes.is_echo(frame):
             return

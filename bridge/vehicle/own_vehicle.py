@@ -214,7 +214,7 @@ class OwnVehicle:
     def refuse_current(self, sender: Sender, now: float) -> None:
         """Send MISSION_CURRENT to a ground station whose MISSION_SET_CURRENT was refused, or withhold it.
 
-        Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats its request at each
+        Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats the request at each
         that has another number, without end.
         """
         if sender.station.behaviour.streams:

@@ -33,7 +33,7 @@ class _ModeNumbers(NamedTuple):
 
 #: An aeroplane's are those of INAV's own MAVLink (telemetry/mavlink.c), except for NAV COURSE HOLD, which INAV does not
 #: number. Unless it navigates, a rover is steered by hand: MANUAL, 0; ArduRover's ACRO, 1, holds the course. Of modes
-#: with the same number, the first gives its name.
+#: with the same number, the first gives the name.
 _MODES = {
     FlightMode.STABILIZE: _ModeNumbers(0, 5, 0),
     FlightMode.HORIZON: _ModeNumbers(0, 2, 0),

@@ -77,7 +77,7 @@ def rendered(happening: Happening, kind: Kind) -> list[tuple[Severity, str]]:
     if severity > Severity.WARNING:
         return [(severity, whole)]
     if kind is Kind.QGROUNDCONTROL and severity is Severity.ERROR:
-        # It shows the refusal in a dialog of its own.
+        # It shows the refusal in a dialog.
         severity = Severity.WARNING
     # The Messages tab has what the line lacks.
     line = happening.line

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Problems in mission files of all formats: the error, the notes about fixes, and common checks.
 
-A file without a mission is named by its content, so that a person learns which file was chosen by mistake.
+A file without a mission is named by the content, so that a person learns which file was chosen by mistake.
 """
 
 import math

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line that shares the port with MSP: how a board in it is recognised, and left undisturbed.
 
-In its command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`. A looped-back line
+In the command line a board echoes requests, without unprintable bytes: IDENT comes back as `$M<dd`. A looped-back line
 returns it whole. DEL erases a character of the typed line. This applies to Harakiri (cli.c, tree TestCode3), Baseflight
 and INAV; HarakiriWebstore1 ignores DEL.
 """

@@ -129,7 +129,7 @@ class MspParser:
 
     After a bad checksum the search resumes one byte later, so a frame hidden behind a false header is still found.
     `takes_low_v2`: accept v2 frames of v1's commands, too, as configurators send them; a flight controller sends such
-    frames only in reply to them. Call `reset` when the line has been silent: an incomplete frame keeps its bytes.
+    frames only in reply to them. Call `reset` when the line has been silent: bytes of an incomplete frame are kept.
     """
 
     def __init__(self, *, takes_low_v2: bool = False) -> None:

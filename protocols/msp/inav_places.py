@@ -134,7 +134,7 @@ class Geozone:
 
 
 class GeozoneHead(NamedTuple):
-    """A reply to GEOZONE: a zone without its corners. is_polygon: else a circle."""
+    """A reply to GEOZONE: a zone without the corners. is_polygon: else a circle."""
 
     number: int
     is_inclusive: bool

@@ -67,7 +67,7 @@ class UnsafeRecord(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class NavRecord:
-    """One record. Its number is the position in the list, counted from 1.
+    """One record. The number is the position in the list, counted from 1.
 
     lat_e7, lon_e7: degrees * 1e7. alt_cm: above home, or above mean sea level if bit 0 of p3 is set. `flag` is LAST for
     the last record. `action` is a plain int because a flight controller may have an unknown number.

@@ -93,7 +93,7 @@ SETTINGS: Mapping[Firmware, tuple[SettingsRequest, ...]] = {
     Firmware.CLEANFLIGHT: _NEW,
     Firmware.BETAFLIGHT: _NEW,
     Firmware.INAV: (RANGES,),
-    # Its MISC may have counters, and the rates any layout.
+    # MISC may have counters, and the rates any layout.
     Firmware.UNKNOWN: (_PIDS, SettingsRequest(Part.RATES, Msp.RC_TUNING, 204)),
 }
 _PID_SIZE = 3

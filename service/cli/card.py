@@ -3,7 +3,7 @@
 
 It adds a folder to the boot partition and one line to what Raspberry Pi Imager left there for the first start: the
 script firstrun.sh (bookworm), or cloud-init's user-data (trixie). That line enables a unit, which installs the package,
-runs `naze-bridge setup`, removes the folder with its secrets, and restarts the Pi.
+runs `naze-bridge setup`, removes the folder with the secrets, and restarts the Pi.
 """
 
 import re

@@ -72,7 +72,7 @@ def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tupl
 
 
 def duration(seconds: float) -> str:
-    """A time in its two largest units: "2 h 5 min"."""
+    """A time in the two largest units: "2 h 5 min"."""
     whole = int(seconds)
     if whole < _MINUTE_S:
         return f"{whole} s"

@@ -43,7 +43,7 @@ from service.settings import Settings
 from service.settings.addresses import AutoFc, FcAddress, GcsAddress, SerialFc
 from storage.os_error import reason
 
-#: Timeouts of a stop: for a push to finish, for its abort, for the store. Together they stay within 2 s.
+#: Timeouts of a stop: for a push to finish, for the abort, for the store. Together they stay within 2 s.
 _FINISH_S = 1.0
 _ABORT_S = 0.6
 _STORE_TIMEOUT_S = 0.2
@@ -57,7 +57,7 @@ _log = structlog.get_logger()
 
 
 class Follower:
-    """A part of this process that follows the daemon's events. Its methods must not block."""
+    """A part of this process that follows the daemon's events. The methods must not block."""
 
     def telemetry(self, groups: frozenset[Group]) -> None:
         """New values in these groups, which were requested with `Bridge.watch`."""
@@ -224,7 +224,7 @@ class Daemon:
         self._signing.reset()
 
     def flush(self) -> None:
-        """Carry out the effects that the bridge has after an input, and set its timer."""
+        """Carry out the effects that the bridge has after an input, and set the timer."""
         for effect in self.bridge.take():
             match effect:
                 case Datagrams():

@@ -26,7 +26,7 @@ OTHER_PRODUCTS = ("gps", "gnss", "u-blox", "radio", "telemetry", "sik")
 
 @dataclass(frozen=True, slots=True)
 class SerialPort:
-    """`path`: the device. `key`: its identity, made of the USB socket and the chip."""
+    """`path`: the device. `key`: the identity, made of the USB socket and the chip."""
 
     path: str
     key: str

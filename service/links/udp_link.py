@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ground stations over UDP.
 
-A connected station of an udpin link has a socket of its own on the same port, to which the kernel passes only its
+A connected station of an udpin link has a separate socket on the same port, to which the kernel passes only its
 datagrams: a flood from others fills the queue of the open socket, not of this socket.
 """
 

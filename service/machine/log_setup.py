@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Logs to standard error: coloured and short on a terminal, one JSON object a line elsewhere.
 
-For journald each line has its priority in front (sd-daemon(3)).
+For journald each line begins with the priority (sd-daemon(3)).
 """
 
 import logging
@@ -30,7 +30,7 @@ _KEPT, _MOST_TEXT = 300, 1000
 _log = structlog.get_logger()
 
 
-#: What an event is about, by the first part of its name.
+#: What an event is about, by the first part of the name.
 _SUBJECTS = {
     "config": "Settings",
     "daemon": "Bridge",

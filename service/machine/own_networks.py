@@ -12,7 +12,7 @@ _GATEWAY = 0x0002  # RTF_GATEWAY
 #: A wider route, as of a mobile modem, is a way to the internet.
 _WIDEST = 8
 _LOOPBACK = IPv4Network("127.0.0.0/8")
-#: Wi-Fi may come up, and change its address, at any time.
+#: Wi-Fi may come up, and change the address, at any time.
 _FRESH_S = 1.0
 
 

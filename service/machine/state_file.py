@@ -21,7 +21,7 @@ _log = structlog.get_logger()
 
 
 class StateFile:
-    """Written by its own thread, because an SD card may take a second. `without`: the effect of losing it.
+    """Written by a separate thread, because an SD card may take a second. `without`: the effect of losing it.
 
     Without a `folder` it does not store anything.
     """

@@ -101,7 +101,7 @@ def items_from_records(records: Iterable[WpRecord], sent_as: Mapping[int, int] =
     """The items of a stored list (docs/mission-rules.md, "Read-back").
 
     Frame 3, home frame 0. A region of interest gets the command number from `sent_as` (stored seq to MAV_CMD), else
-    80. A record with an unknown WpCommand becomes MAV_CMD 0, with the raw number as its param1: no ground station
+    80. A record with an unknown WpCommand becomes MAV_CMD 0, with the raw number as param1: no ground station
     treats that as a flight command, and the rules would drop it (our own choice).
     """
     return [_item(seq, record, sent_as) for seq, record in enumerate(records)]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's geozones as a fence: circles and polygons. A fence's items cannot carry heights and actions.
 
-They take effect after INAV's next start, and only with its feature GEOZONE (src/main/navigation/navigation_geozone.c).
+They take effect after INAV's next start, and only with the feature GEOZONE (src/main/navigation/navigation_geozone.c).
 """
 
 from collections.abc import Mapping, Sequence

@@ -262,7 +262,7 @@ class InavMissions(NavMissions, FliesToItems):
     def _load_first(self, saved: NavInfo) -> Conversation[None]:
         """Until LOAD, INAV treats the written records as one long mission, whose last record decides about landing.
 
-        An aeroplane would land without its approach: only a loaded mission has a number (loadedMultiMissionIndex).
+        An aeroplane would land without the approach: only a loaded mission has a number (loadedMultiMissionIndex).
         """
         if self.others or self._platform is Platform.AEROPLANE:
             reply = yield from ask(LOAD_REQUEST, Nav.LOAD, 0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """INAV's safehomes, as rally points, and the store that geozones share with them: in RAM until INAV saves.
 
-The old places stay in its flash until the new places are read back equal. Otherwise the old places are written again.
+The old places stay in flash until the new places are read back equal. Otherwise the old places are written again.
 A safehome lacks a height, but has an approach by which an aeroplane lands. Each MSP_SET_WP erases an approach: that of
 the mission whose number is the count of missions written since the boot, and after nine missions all of them, also
 those of the safehomes (fc_msp.c, 7.1.0 to 9.1.0). SAVE would store that.
@@ -167,7 +167,7 @@ def with_approaches(safehomes: Sequence[Safehome], approaches: Sequence[FwApproa
 
 
 class InavSafehomes(InavPlaceStore[Safehome]):
-    """Writing a safehome erases its landing approach, which is then written again."""
+    """Writing a safehome erases the landing approach, which is then written again."""
 
     def pull(self) -> Conversation[tuple[Safehome, ...] | None]:
         safehomes = yield from read_safehomes()

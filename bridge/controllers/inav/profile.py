@@ -112,7 +112,7 @@ def _time(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: 
 
 
 def _home(vehicle: Vehicle, payload: bytes, _controller: FlightController, _now: float) -> None:
-    """MSP_WP 0. Its altitude is in cm; RAW_GPS has whole metres."""
+    """MSP_WP 0. The altitude is in cm, in RAW_GPS in whole metres."""
     answer = decode_wp(payload)
     if answer is not None and answer[0] == 0:
         home = answer[1]

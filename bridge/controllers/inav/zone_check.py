@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mission's way and INAV's geozones (navigation_geozone.c of 9.1.0; flown by tests/real_inav/test_zones.py).
 
-In its waypoint mode INAV acts at a border only if the zone has an action and the switch of ANGLE (HORIZON, COURSE HOLD,
+In waypoint mode INAV acts at a border only if the zone has an action and the switch of ANGLE (HORIZON, COURSE HOLD,
 CRUISE) is on as well (performeFenceAction). Of six returns on the SITL three flew around a zone, three through it, with
 ANGLE on and off.
 """

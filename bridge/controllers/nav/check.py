@@ -315,7 +315,7 @@ class NavCheck(ListCheck):
         return alt_cm, 0
 
     def _flown_height(self, item: MissionItem, alt_cm: int, *, above_sea: bool) -> int:
-        """Replace 0 m, and warn about a leg at or below its reference level: it is flown as stored."""
+        """Replace 0 m, and warn about a leg at or below the reference level: it is flown as stored."""
         if alt_cm == 0 and not above_sea:
             self._note(item, "alt_m", item.alt_m, LEAST_HEIGHT_M, "0 m is not allowed", News.WARNING)
             return 100 * LEAST_HEIGHT_M

@@ -18,7 +18,7 @@ _SILENCE_S = 2.5
 _LINE_SILENCE_S = 0.1
 #: Armed it sends the attitude 30 times a second: when that ends, it has disarmed and changed the speed.
 _ARMED_SILENCE_S = 0.8
-#: Its stream of 1600 bytes a second overruns its own send ring on a slow line, so most frames are torn: before it
+#: A stream of 1600 bytes a second overruns Harakiri's send ring on a slow line, so most frames are torn: before it
 #: counts as lost, this many bytes may pass without a whole one. At 2400 baud whole ones come up to 3.5 s apart. At 1200
 #: baud there is one in 40 s: no deadline would help.
 _BYTES_BEFORE_LOSS = 1000

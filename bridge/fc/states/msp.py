@@ -178,7 +178,7 @@ class Polling(MspLine):
 
 
 class Cli(State):
-    """The board was left in its command line, or a terminal program opened it.
+    """The board was left in the command line, or a terminal program opened it.
 
     Sends only complete requests without a line end, and DEL, which erases them: so the pilot's `exit` stays intact,
     and none is executed. A reply or a heartbeat shows that it is back.

@@ -170,7 +170,7 @@ class Searching(State):
             visit.heartbeat = frame
             if not visit.probes and visit.answer is None:
                 visit.phase_ends = now
-            # MSP may still answer, and a reply that is being confirmed keeps its full time.
+            # MSP may still answer, and a reply that is being confirmed keeps the full time.
             visit.ends = max(now + self._two_probes_s(), visit.phase_ends)
 
     def _conclude(self, spoken: Spoken, why: str) -> None:

@@ -46,7 +46,7 @@ def diagnose(
     fc: str | None = None, config: Path | None = None, state_dir: Path | None = None, *, as_json: bool = False
 ) -> bool:
     """Print the result of each check. Returns False if there is a problem."""
-    # A service's control socket is not in its state directory. With explicit options only that directory counts.
+    # A service's control socket is not in the state directory. With explicit options only that directory counts.
     asked = partial(ask_daemon, state_dir, STATUS)
     if config is None and fc is None and SERVICE_CONFIG.exists():
         config = SERVICE_CONFIG

@@ -69,7 +69,7 @@ def receive(pi: ThisPi, size: int) -> str:
 
 
 def can_update(host: Host) -> bool:
-    """True if the installed package knows a key of its releases."""
+    """True if the installed package knows a key for releases."""
     return has_key(host.read(SIGNERS))
 
 
