@@ -31,7 +31,7 @@ FLIGHTS = {
         f"{_CHECK}::test_the_core_refuses_exactly_the_reported_lists"
     ),
     "Harakiri: mission_radius, and random lists": f"{_CHECK}::test_exactly_the_refusals_of_the_core_are_reported",
-    "Harakiri: public missions": f"{_CHECK}::test_the_core_refuses_no_public_mission_without_a_word",
+    "Harakiri: public missions": f"{_CHECK}::test_every_refusal_of_a_public_mission_is_reported",
     "Harakiri: TAKEOFF only first, LAND only last, no ROI last, only the commands of the table": (
         f"{_CORE}::test_refusals"
     ),
@@ -43,23 +43,21 @@ FLIGHTS = {
     ),
     "INAV: nav_wp_max_safe_distance": (f"{_ARMING}::test_a_distant_first_place_arms_within_nav_wp_max_safe_distance"),
     "INAV: arming in and outside of geozones": f"{_ARMING}::test_it_arms_exactly_in_the_zones_that_the_rules_accept",
-    "INAV: LOITER_UNLIM as a hold, 120 records": (
-        f"{_ARMING}::test_it_stores_the_records_that_the_rules_make_and_no_others"
-    ),
+    "INAV: LOITER_UNLIM as a hold, 120 records": (f"{_ARMING}::test_it_stores_exactly_the_records_of_the_rules"),
     "INAV: each row of the first table of docs/inav.md": f"{_ROWS}::test_each_row_is_flown_as_documented",
-    "INAV: TAKEOFF is not needed": f"{_LIMITS}::test_it_takes_off_without_a_record_for_it_and_with_low_throttle",
+    "INAV: TAKEOFF is not needed": f"{_LIMITS}::test_it_takes_off_without_a_takeoff_record_at_low_throttle",
     "INAV: nav_max_altitude, nav_wp_enforce_altitude": (
         f"{_LIMITS}::test_a_list_above_nav_max_altitude_is_refused_where_it_would_fly_lower"
     ),
-    "INAV: heights above sea level": f"{_LIMITS}::test_a_height_counts_from_the_level_that_is_said",
-    "INAV: nav_max_auto_speed, speed of a leg": f"{_LIMITS}::test_a_leg_is_flown_at_the_speed_that_is_said",
+    "INAV: heights above sea level": f"{_LIMITS}::test_a_height_counts_from_the_reported_level",
+    "INAV: nav_max_auto_speed, speed of a leg": f"{_LIMITS}::test_a_leg_is_flown_at_the_reported_speed",
     "INAV: nav_wp_radius": f"{_LIMITS}::test_a_leg_within_nav_wp_radius_counts_as_reached_at_once",
-    "INAV: nav_rth_altitude, nav_rth_alt_mode": f"{_LIMITS}::test_a_return_flies_at_the_height_that_is_said",
+    "INAV: nav_rth_altitude, nav_rth_alt_mode": f"{_LIMITS}::test_a_return_flies_at_the_reported_height",
     "INAV: CONDITION_YAW, ROI": f"{_LIMITS}::test_the_nose_turns_as_the_record_says",
-    "INAV: return to a safehome": f"{_LIMITS}::test_a_return_goes_to_the_safehome_that_is_said",
+    "INAV: return to a safehome": f"{_LIMITS}::test_a_return_goes_to_the_reported_safehome",
     "INAV: RTL that lands, or not": f"{_LIMITS}::test_the_last_record_decides_if_a_return_lands",
     "INAV: geozone on the way, also after a jump; its heights; without an action": (
-        f"{_ZONES}::test_a_mission_stops_at_a_zone_as_said"
+        f"{_ZONES}::test_a_mission_stops_at_a_zone_as_reported"
     ),
     "INAV: geozone with the action RTH": f"{_ZONES}::test_it_returns_from_a_zone_with_that_action",
     "INAV: landing of an aeroplane by an FW approach": "source: navigation/navigation.c:1848, fwAutolandApproachConfig",

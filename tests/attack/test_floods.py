@@ -22,7 +22,7 @@ def command(number: int, p1: float = 0.0, p2: float = 0.0) -> Message:
     return m.MAVLink_command_long_message(1, 1, number, 0, p1, p2, 0, 0, 0, 0, 0)
 
 
-def test_the_text_of_a_refusal_goes_only_to_the_refused_station(bench: Bench, stack: ExitStack) -> None:
+def test_the_text_of_a_refusal_goes_only_to_its_station(bench: Bench, stack: ExitStack) -> None:
     """Refusals sent to a stranger do not reach the pilot."""
     stranger = Stranger(bench.daemon.address)
     stack.callback(stranger.close)

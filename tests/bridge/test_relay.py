@@ -167,7 +167,7 @@ def test_all_other_frames_and_those_of_other_targets_are_passed_on() -> None:
         assert len(bench.to_vehicle) == 1
 
 
-def test_the_sequence_numbers_do_not_have_gaps() -> None:
+def test_the_sequence_numbers_are_gapless() -> None:
     bench = connected()
     for _ in range(3):
         bench.heartbeat()

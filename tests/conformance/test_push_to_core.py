@@ -177,7 +177,9 @@ def test_146_records_arrive_bit_for_bit_and_read_back() -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize(("disturb", "rate"), [(bit_errors, 1e-3), (cut_frames, 0.2)])
-def test_bad_lines_delay_but_change_no_record(disturb: Callable[[float, int], Disturb], rate: float, seed: int) -> None:
+def test_bad_lines_delay_records_without_changing_them(
+    disturb: Callable[[float, int], Disturb], rate: float, seed: int
+) -> None:
     line = Line(disturb(rate, seed))
     # Damage undetected by the XOR may turn a reply into a refusal, but never into a success.
     for _ in range(20):

@@ -50,7 +50,7 @@ def replies(bench: Bench, requests: list[bytes]) -> list[str]:
     return lines
 
 
-def test_worked_exchange_is_true() -> None:
+def test_worked_exchange_is_right() -> None:
     page = PAGE.read_text()
     assert f"`{pack_records([HOME, WAYPOINT]).hex()}`" in page
     printed = re.findall(r"^(?:->|<-) [0-9a-f ]+$", page, re.MULTILINE)

@@ -54,7 +54,7 @@ def damaged_frames(seed: int, count: int) -> Iterator[bytes]:
         yield bytes(frame)
 
 
-def test_a_megabyte_of_noise_on_udp_does_no_harm(shared: Bench, kept: list[str]) -> None:
+def test_a_megabyte_of_noise_on_udp_is_harmless(shared: Bench, kept: list[str]) -> None:
     status = shared.daemon.status()
     assert status is not None
     before = status["ground_stations"]
@@ -74,7 +74,7 @@ def test_a_megabyte_of_noise_on_udp_does_no_harm(shared: Bench, kept: list[str])
     assert shared.board.records() == records_of(judge(plan))
 
 
-def test_a_megabyte_of_noise_from_a_tcp_client_does_no_harm(start: Starter) -> None:
+def test_a_megabyte_of_noise_from_a_tcp_client_is_harmless(start: Starter) -> None:
     port = free_port(socket.SOCK_STREAM)
     bench = start.bench(gcs=[f"tcpin:127.0.0.1:{port}"])
     with socket.create_connection(("127.0.0.1", port)) as stranger:
@@ -121,7 +121,7 @@ class NoisyWire:
         os.close(self._near)
 
 
-def test_a_megabyte_of_noise_on_the_uart_does_no_harm(start: Starter) -> None:
+def test_a_megabyte_of_noise_on_the_uart_is_harmless(start: Starter) -> None:
     wire = NoisyWire(start.directory / "naze")
     daemon = start.daemon(str(wire.path))
     daemon.wait("searching")

@@ -149,7 +149,7 @@ def test_a_harakiri_that_speaks_mavlink_while_armed_is_one_vehicle(start: Starte
 # -- the daemon ----------------------------------------------------------------------------------------------
 
 
-def test_a_kill_right_after_the_ack_does_not_lose_anything(start: Starter) -> None:
+def test_an_acknowledged_mission_survives_an_immediate_kill(start: Starter) -> None:
     bench = start.bench()
     with udp_station(bench.daemon.address) as station:
         station.send_heartbeat()

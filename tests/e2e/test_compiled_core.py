@@ -104,7 +104,7 @@ async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: 
     assert bench.board.records() == bench.daemon.pull()["records"] == NEW_RECORDS
 
 
-async def test_bit_errors_damage_no_list(start: Starter) -> None:
+async def test_bit_errors_keep_lists_intact(start: Starter) -> None:
     bench, _ = start_on_core(start)
     bench.daemon.push(OLD)
     bench.board.set("bit_error_rate 0.001")

@@ -124,7 +124,7 @@ def test_mission_planners_tabs_write_read_and_clear(inav: Bench, tab: int, plan:
         assert len(planner.read()) == 2
 
 
-def test_mission_planner_shows_that_a_version_without_geozones_does_not_have_a_fence(start: Starter) -> None:
+def test_mission_planner_shows_that_a_version_without_geozones_lacks_a_fence(start: Starter) -> None:
     board = start.board("--kind", "inav", "--inav-version", "7.1.2", tcp=True)
     daemon = start.daemon(board.fc)
     daemon.wait()
@@ -195,7 +195,7 @@ def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path
         mavproxy.wait_for("Requesting 1 waypoints")
 
 
-def test_after_a_restart_of_the_board_the_reported_mission_is_true(start: Starter) -> None:
+def test_after_a_board_restart_the_reported_mission_is_right(start: Starter) -> None:
     board = start.board("--kind", "inav", tcp=True)
     daemon = start.daemon(board.fc)
     daemon.wait()

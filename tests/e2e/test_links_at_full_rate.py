@@ -110,9 +110,7 @@ def connected_udp(port: int) -> socket.socket:
     return connection
 
 
-def test_does_not_lose_anything_at_any_rate_and_a_stalled_client_gets_the_acks(
-    start: Starter, autopilot: Autopilot
-) -> None:
+def test_is_lossless_at_any_rate_and_a_stalled_client_gets_the_acks(start: Starter, autopilot: Autopilot) -> None:
     udp, tcp = free_port(), free_port(socket.SOCK_STREAM)
     daemon = start.daemon(str(autopilot.path), gcs=[f"udpin:127.0.0.1:{udp}", f"tcpin:127.0.0.1:{tcp}"])
     daemon.wait("MAVLink")

@@ -135,7 +135,7 @@ def test_applying_again_updates_the_core(workshop: Workshop) -> None:
     assert workshop.files() == patched
 
 
-def test_removing_a_patch_that_is_not_applied_does_not_change_anything(workshop: Workshop) -> None:
+def test_removing_an_unapplied_patch_leaves_the_tree(workshop: Workshop) -> None:
     assert workshop.run("--remove") == (0, "Tree: the patch is not in it, nothing to do\n")
 
 

@@ -219,7 +219,7 @@ def test_the_subscriber_in_the_docs_works(fleet: Fleet, tmp_path: Path) -> None:
         reader.wait()
 
 
-def test_two_bridges_with_one_name_do_not_get_a_mission(fleet: Fleet, tmp_path: Path) -> None:
+def test_two_bridges_with_one_name_refuse_missions(fleet: Fleet, tmp_path: Path) -> None:
     other = fleet.start("other", name="owl")
     try:
         until(lambda: fleet.listed()["owl"]["bridges"] == 2, "the second owl")

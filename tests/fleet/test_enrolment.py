@@ -140,7 +140,7 @@ def test_logins_are_secret_and_kept(enrolled: Enrolled) -> None:
     "name",
     ["ca", "router", "Router", "../kite", "/kite", ".", ".kite", "-kite", "kite:x", "ki\x1bte", "ki\nte", ""],
 )
-def test_a_name_that_is_not_a_members_is_refused_and_does_not_change_anything(enrolled: Enrolled, name: str) -> None:
+def test_an_unknown_member_is_refused_without_changes(enrolled: Enrolled, name: str) -> None:
     def files() -> dict[Path, bytes]:
         return {
             path: path.read_bytes()

@@ -85,7 +85,7 @@ def tokens(session: zenoh.Session, seconds: float = TIMEOUT_S) -> list[str]:
 
 
 @pytest.mark.parametrize("expelled", ["kite", "bert"])
-def test_an_expelled_member_does_not_have_rights_after_the_routers_restart(fleet: Members, expelled: str) -> None:
+def test_an_expelled_member_loses_all_rights_when_the_router_restarts(fleet: Members, expelled: str) -> None:
     old_login = fleet.config(expelled)
     done = fleet.expel(expelled)
     assert done.returncode == 0, done

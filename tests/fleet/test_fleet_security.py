@@ -190,7 +190,7 @@ def test_a_members_certificate_cannot_pass_for_the_routers(tls: Fleet, tmp_path:
 
 
 @pytest.mark.parametrize("name", ["ca", "router", "../kite", "ki\x1bte"])
-def test_no_certificate_is_made_for_a_name_of_the_folders_files(tls: Fleet, name: str) -> None:
+def test_reserved_names_do_not_get_certificates(tls: Fleet, name: str) -> None:
     before = sorted(tls.folder.parent.rglob("*.key"))
     with pytest.raises(subprocess.CalledProcessError) as failed:
         make_certificates(tls.folder, name)

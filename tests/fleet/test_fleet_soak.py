@@ -108,7 +108,7 @@ class Network(threading.Thread):
 
 
 @pytest.mark.timeout(120 + 10 * DAEMONS + 60 * CUTS)
-def test_does_not_lose_anything_when_networks_are_cut(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_everything_arrives_after_network_cuts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names = [f"naze-{number}" for number in range(DAEMONS)]
     share = random.Random(1)
     with ExitStack() as stack:

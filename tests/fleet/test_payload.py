@@ -41,7 +41,7 @@ class _Payload:
         self.to_bytes = lambda: data
 
 
-def test_every_text_in_a_payload_is_safe_to_print_names_of_settings_too() -> None:
+def test_every_text_in_a_payload_is_safe_to_print() -> None:
     body = json.dumps({"values": {"a\x1b[2J": "b\x1b]8;;http://e\x07"}, "list": ["\u202e"]}).encode()
     sample = SimpleNamespace(payload=_Payload(body), encoding="application/json")
     assert decode(cast("zenoh.Sample", sample)) == {"values": {"a[2J": "b]8;;http://e"}, "list": [""]}

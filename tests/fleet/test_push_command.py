@@ -22,7 +22,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
         yield fleet
 
 
-def test_a_dry_run_reports_the_corrections_and_does_not_write_anything(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_dry_run_reports_corrections_without_writing(fleet: Fleet, tmp_path: Path) -> None:
     before = [fleet.daemons[name].pull() for name in NAMES]
     file = plan_file(tmp_path, [*plain_plan(4, start=90), PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", file, "--all", "--dry-run")
@@ -35,7 +35,7 @@ def test_a_dry_run_reports_the_corrections_and_does_not_write_anything(fleet: Fl
     assert bad.stdout.count("Rejected, WP 1: LAND must be last") == 3
 
 
-def test_a_file_without_a_storable_item_does_not_erase_anything(fleet: Fleet, tmp_path: Path) -> None:
+def test_a_file_without_storable_items_keeps_the_mission(fleet: Fleet, tmp_path: Path) -> None:
     fleet.pushed(plan_file(tmp_path, plain_plan(4)), "--vehicle", "kite", code=0)
     nothing = plan_file(tmp_path, [HOME, PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", nothing, "--vehicle", "kite", "--dry-run")

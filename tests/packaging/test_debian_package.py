@@ -194,7 +194,7 @@ def test_every_library_has_a_pinned_wheel(architecture: str, python: str, wheels
     assert [wheel for wheel in {*wheels.iterdir()} - before if not wheel.stem.endswith(machines)] == []
 
 
-def test_the_pages_do_not_have_a_broken_links(package: Path) -> None:
+def test_the_pages_links_are_intact(package: Path) -> None:
     files = files_of(package)
     with _archive(package) as archive:
         for member in archive:
@@ -207,7 +207,7 @@ def test_the_pages_do_not_have_a_broken_links(package: Path) -> None:
                 assert target in files or f"{target}/" in files, f"{member.name}: {link}"
 
 
-def test_the_package_does_not_have_paths_of_the_build_machine(package: Path) -> None:
+def test_the_package_is_free_of_build_machine_paths(package: Path) -> None:
     with _archive(package) as archive:
         for member in archive:
             content = archive.extractfile(member) if member.isfile() else None

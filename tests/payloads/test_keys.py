@@ -4,7 +4,7 @@
 from payloads.keys import COMMAND_KEYS, COMMANDS, KEYS, MAVLINK_IN, full, vehicle_in
 
 
-def test_no_two_keys_are_alike() -> None:
+def test_keys_are_unique() -> None:
     assert len({key.suffix for key in KEYS}) == len(KEYS)
 
 

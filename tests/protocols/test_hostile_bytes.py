@@ -87,7 +87,7 @@ def counted_lines() -> Iterator[list[int]]:
 
 @pytest.mark.parametrize("size", [1, 64, SIZE])
 @pytest.mark.parametrize("name", PARSERS)
-def test_no_byte_costs_more_than_a_few_lines(name: str, size: int) -> None:
+def test_a_damaged_byte_costs_at_most_a_few_lines(name: str, size: int) -> None:
     for title, pattern in PATTERNS.items():
         data = (pattern * (SIZE // len(pattern) + 1))[:SIZE]
         with counted_lines() as lines:

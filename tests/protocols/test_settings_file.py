@@ -99,7 +99,7 @@ def test_only_the_selected_profiles_count_and_other_lines_are_listed() -> None:
     assert unread_text(found.unread) == "10 (feature), 11-12 (serial), 22 (control_profile 2)"
 
 
-def test_the_dumps_of_other_firmwares() -> None:
+def test_reads_the_dumps_of_other_firmwares() -> None:
     betaflight = b"# Betaflight / STM32F7X2 (S7X2) 4.4.2 Jun  1 2023 / 06:05:08 (23d066d08)\nset p_roll = 45\nsave\n"
     assert read_settings_file(betaflight, "x")[0::2] == ({"p_roll": "45"}, "Betaflight 4.4.2")
     cleanflight = b"# Cleanflight/NAZE 1.13.0 Jul 17 2016 / 10:00:00 (abcdef0)\nset p_roll = 40\n"
@@ -110,7 +110,7 @@ def test_the_dumps_of_other_firmwares() -> None:
     assert unread_text(found.unread) == "1 (Config:), 2 (FW:), 3 (Current)"
 
 
-def test_a_dump_that_is_written_is_read_again() -> None:
+def test_a_written_dump_reads_back() -> None:
     text = write_dump({"nav_rth_alt_mode": "FIXED", "MODE_ANGLE": "AUX1 1300-1700"}, "INAV 8.0.1", ["taken: today"])
     assert text.splitlines()[1:] == ["# taken: today", "set nav_rth_alt_mode = FIXED", *text.splitlines()[3:]]
     assert text.splitlines()[3:] == ["# MODE_ANGLE = AUX1 1300-1700", "save"]

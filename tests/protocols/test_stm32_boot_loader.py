@@ -45,7 +45,7 @@ def all_cuts() -> int:
     return bench.sent
 
 
-def test_after_a_cut_anywhere_the_next_session_works_and_no_other_page_has_changed() -> None:
+def test_after_any_cut_the_next_session_works_and_other_pages_are_unchanged() -> None:
     for cut in range(all_cuts()):
         board = board_in_boot_loader()
         before = board.flash_contents
@@ -84,7 +84,7 @@ def test_a_missing_boot_loader_is_not_found() -> None:
     assert waiting == [True]
 
 
-def test_a_board_switched_on_meanwhile_is_found() -> None:
+def test_a_board_switched_on_during_the_wait_is_found() -> None:
     board = board_in_boot_loader()
     board.power_off(0.0)
     bench = DialogueBench(board)
@@ -92,7 +92,7 @@ def test_a_board_switched_on_meanwhile_is_found() -> None:
     assert bench.run(read_chip_id()) == 0x410
 
 
-def test_a_refused_command_says_which() -> None:
+def test_a_refusal_names_the_command() -> None:
     bench = DialogueBench(board_in_boot_loader())
     bench.run(synchronise(1.0))
     with pytest.raises(BootLoaderError, match="refuses a read"):

@@ -34,7 +34,7 @@ def listed(table: SettingTable) -> list[BoardSetting]:
     return [setting for setting in table if not setting.name.startswith("BOX_")]
 
 
-def test_the_first_list_and_telemetry_beside_it(world: World, figure: Figure) -> None:
+def test_telemetry_continues_during_the_first_list(world: World, figure: Figure) -> None:
     client, began = SettingsClient(world), world.now
     table = client.wait_read()
     took_s = world.now - began
@@ -83,7 +83,7 @@ def values(table: SettingTable) -> dict[str, Value]:
     return {setting.name: setting.value for setting in table}
 
 
-def test_every_setting_out_of_range_is_refused_and_its_own_value_does_not_change_anything(world: World) -> None:
+def test_every_setting_refuses_values_out_of_range_and_accepts_its_own(world: World) -> None:
     client = SettingsClient(world)
     table = client.wait_read()
     for setting in table:

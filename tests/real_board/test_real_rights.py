@@ -69,7 +69,7 @@ def set_switches(naze: EmulatedNaze) -> None:
     faults.aux1 = faults.aux2 = faults.aux3 = faults.aux4 = _SWITCH_ON_US
 
 
-def test_a_read_only_share_does_not_change_anything(image: Image, flash: bytes, figure: Figure) -> None:
+def test_a_read_only_share_cannot_change_settings(image: Image, flash: bytes, figure: Figure) -> None:
     world = World(speeds=(115200,), peer=EmulatedNaze(image, flash=memoryview(bytearray(flash))))
     set_switches(world.naze)
     world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, _BOOT_S)

@@ -186,7 +186,7 @@ def test_another_size_is_refused(settable: RealBench) -> None:
     assert (configuration(bench), bytes(bench.flash)) == (before, flash)
 
 
-def test_armed_it_does_not_read_anything_set_or_saved(settable: RealBench, figure: Figure) -> None:
+def test_settings_cannot_be_read_or_changed_while_armed(settable: RealBench, figure: Figure) -> None:
     bench = settable
     settings, checksum = settings_of(bench), table(bench).checksum
     bench.arm()

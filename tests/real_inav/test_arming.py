@@ -68,7 +68,7 @@ def test_it_arms_exactly_in_the_zones_that_the_rules_accept(sitl: Sitl, zone: Ge
     assert is_refused((leg(20), leg(40)), zones=(zone,)) != arms
 
 
-def test_it_stores_the_records_that_the_rules_make_and_no_others(sitl: Sitl) -> None:
+def test_it_stores_exactly_the_records_of_the_rules(sitl: Sitl) -> None:
     """An acknowledged SET_WP is not stored: LOITER_UNLIM as POSHOLD_UNLIM, and a record beyond the capacity."""
     sitl.configure()
     sitl.run(1)

@@ -33,7 +33,7 @@ def test_a_list_above_nav_max_altitude_is_refused_where_it_would_fly_lower(
 
 
 @pytest.mark.parametrize(("asked_cm_s", "flown_m_s"), [(1200, 7.0), (600, 6.0), (0, 3.0)])
-def test_a_leg_is_flown_at_the_speed_that_is_said(sitl: Sitl, asked_cm_s: int, flown_m_s: float) -> None:
+def test_a_leg_is_flown_at_the_reported_speed(sitl: Sitl, asked_cm_s: int, flown_m_s: float) -> None:
     records = leg(60, p1=asked_cm_s), leg(400, p1=asked_cm_s)
     sitl.configure(nav_max_auto_speed=700, nav_auto_speed=300)
     sitl.fly(records)
@@ -73,7 +73,7 @@ def test_a_leg_within_nav_wp_radius_counts_as_reached_at_once(
         ("AT_LEAST", 10, (22, 22), 22),
     ],
 )
-def test_a_return_flies_at_the_height_that_is_said(
+def test_a_return_flies_at_the_reported_height(
     sitl: Sitl, mode: str, setting_m: int, legs_m: tuple[int, int], flown_m: int
 ) -> None:
     climb = leg(40, legs_m[0], action=NavAction.POSHOLD_TIME, p1=10)
@@ -100,7 +100,7 @@ def _until_return(sitl: Sitl) -> None:
 @pytest.mark.parametrize(
     ("mode", "away_m", "returns_there"), [("RTH", 60, True), ("RTH", 140, False), ("RTH_FS", 60, False)]
 )
-def test_a_return_goes_to_the_safehome_that_is_said(sitl: Sitl, mode: str, away_m: float, returns_there: bool) -> None:
+def test_a_return_goes_to_the_reported_safehome(sitl: Sitl, mode: str, away_m: float, returns_there: bool) -> None:
     safehome = Safehome(0, True, *place(0, away_m))
     sitl.ask(SET_SAFEHOME, safehome.pack())
     sitl.configure(safehome_usage_mode=mode, safehome_max_distance=10000, nav_auto_speed=600)
@@ -143,7 +143,7 @@ def test_the_last_record_decides_if_a_return_lands(sitl: Sitl, records: tuple[Na
 
 
 @pytest.mark.parametrize("throttle_us", [1000, 1500])
-def test_it_takes_off_without_a_record_for_it_and_with_low_throttle(sitl: Sitl, throttle_us: int) -> None:
+def test_it_takes_off_without_a_takeoff_record_at_low_throttle(sitl: Sitl, throttle_us: int) -> None:
     sitl.configure()
     sitl.fly((leg(20), leg(40)), throttle_us=throttle_us)
     sitl.run(15)
@@ -151,7 +151,7 @@ def test_it_takes_off_without_a_record_for_it_and_with_low_throttle(sitl: Sitl, 
 
 
 @pytest.mark.parametrize(("is_above_sea", "flown_m"), [(True, 20), (False, 20)])
-def test_a_height_counts_from_the_level_that_is_said(sitl: Sitl, is_above_sea: bool, flown_m: float) -> None:
+def test_a_height_counts_from_the_reported_level(sitl: Sitl, is_above_sea: bool, flown_m: float) -> None:
     records = leg(30, 151, p3=1) if is_above_sea else leg(30, 20), leg(60, 151, p3=1) if is_above_sea else leg(60, 20)
     sitl.configure()
     sitl.fly(records)

@@ -36,7 +36,7 @@ ROUND = leg(20), leg(20, east_m=350), leg(360, east_m=350), leg(360)
         (U, (leg(20), leg(20, east_m=90), leg(300, east_m=90), leg(300, east_m=-90)), [ANGLE], True, OUT),
     ],
 )  # fmt: skip
-def test_a_mission_stops_at_a_zone_as_said(
+def test_a_mission_stops_at_a_zone_as_reported(
     sitl: Sitl, zone: Geozone, records: tuple[NavRecord, ...], switches: list[int], stops: bool, text: str
 ) -> None:
     sitl.configure(zones=[zone], nav_auto_speed=1000)

@@ -146,13 +146,13 @@ def test_resume_mission_keeps_the_rest_and_names_the_way_back(session: Sessions)
     assert dialogs(planner, began) == []
 
 
-def test_a_joystick_is_told_once_that_it_does_not_fly(session: Sessions) -> None:
+def test_a_joystick_is_refused_with_one_text(session: Sessions) -> None:
     planner, _ = session()
     planner.do("joystick", 120)
     assert planner.seen("voice") == ["Joystick ignored: fly with the transmitter"]
 
 
-def test_a_board_armed_before_its_mission_was_read_shows_no_dialog_for_a_read(session: Sessions) -> None:
+def test_a_read_from_a_board_armed_before_connecting_is_silent(session: Sessions) -> None:
     planner, _ = session("--armed", "--tele-prot", "2", state="MAVLink")
     planner.wait_for("armed", "True")
     # Mission Planner takes the first item for home.
@@ -165,7 +165,7 @@ def test_a_board_armed_before_its_mission_was_read_shows_no_dialog_for_a_read(se
     assert "DENIED" in dialog
 
 
-def test_a_lost_craft_is_neither_ready_nor_silent(session: Sessions) -> None:
+def test_a_lost_craft_is_reported_and_not_ready(session: Sessions) -> None:
     planner, board = session()
     for away, back in (("power off", "power on"), ("unplug", "plug")):
         began = planner.now

@@ -53,7 +53,7 @@ def _fuzz(test: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @_fuzz
-def test_no_input_from_ground_stations_raises(seed: int) -> None:
+def test_arbitrary_ground_station_input_never_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     world = ready_world()
     stations = [GroundStation(world, str(number), sysid=250 + number) for number in range(4)]
@@ -66,7 +66,7 @@ def test_no_input_from_ground_stations_raises(seed: int) -> None:
 
 
 @_fuzz
-def test_no_input_from_the_uart_raises(seed: int) -> None:
+def test_arbitrary_uart_input_never_raises(seed: int) -> None:
     inputs = FuzzInputs(seed)
     world = World(speeds=(115200,))
     if inputs.random.random() < 0.7:
@@ -79,7 +79,7 @@ def test_no_input_from_the_uart_raises(seed: int) -> None:
 
 
 @_fuzz
-def test_no_reply_raises(seed: int) -> None:
+def test_arbitrary_replies_never_raise(seed: int) -> None:
     """Frames in place of a board's own: a right checksum around wrong contents."""
     inputs = FuzzInputs(seed)
     faults = Faults()
@@ -97,7 +97,7 @@ def test_no_reply_raises(seed: int) -> None:
 
 
 @_fuzz
-def test_no_mission_file_raises(seed: int) -> None:
+def test_arbitrary_mission_files_never_raise(seed: int) -> None:
     inputs = FuzzInputs(seed)
     for _ in range(AT_ONCE):
         with suppress(MissionFileError):
@@ -124,7 +124,7 @@ def store_file(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @_fuzz
-def test_no_database_file_raises(store_file: bytes, seed: int) -> None:
+def test_arbitrary_database_files_never_raise(store_file: bytes, seed: int) -> None:
     inputs = FuzzInputs(seed)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "missions.db"

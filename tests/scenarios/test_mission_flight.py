@@ -111,7 +111,7 @@ def test_the_sender_sees_the_numbers_of_its_own_list() -> None:
     assert other.messages("MISSION_CURRENT")[-1].seq == 3
 
 
-def test_the_way_is_the_boards_own() -> None:
+def test_the_reported_leg_is_the_boards_own() -> None:
     flight = Flight()
     flight.reports(LEG)
     way = flight.last("NAV_CONTROLLER_OUTPUT")
@@ -184,7 +184,7 @@ def test_a_list_that_ends_with_the_landing_is_complete(tele_prot: TelemetryProto
     assert flight.landed_state == ON_GROUND
 
 
-def test_disarming_in_the_air_does_not_complete_anything() -> None:
+def test_disarming_in_the_air_does_not_complete_the_mission() -> None:
     flight = Flight()
     flight.reports(replace(LEG, record=4, reached=3))
     flight.reports(FlightProgress(record=4, reached=3, reason=FlightReason.DISARMED))
@@ -209,7 +209,7 @@ def test_old_values_are_not_shown_when_the_reports_end(tele_prot: TelemetryProto
     assert mission.item is None
 
 
-def test_a_bridge_restarted_in_flight_announces_no_earlier_record() -> None:
+def test_a_restart_in_flight_does_not_announce_earlier_records() -> None:
     flight = Flight()
     flight.reports(replace(LEG, record=3, reached=2))
     flight.world.restart_bridge()
@@ -234,7 +234,7 @@ def test_a_board_without_mission_flight_is_asked_twice() -> None:
     assert asked(world) == 2
 
 
-def test_the_switch_alone_does_not_fly_anything() -> None:
+def test_the_switch_alone_does_not_start_a_flight() -> None:
     """In MAVLink only the pilot's switches are known; this board has no mission flight."""
     world = World(SimOptions(tele_prot=MAVLINK), faults := Faults(boxes=LEVEL | SWITCH))
     world.wait_ready()

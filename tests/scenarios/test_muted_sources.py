@@ -272,7 +272,7 @@ def flying(board: str) -> Sinks:
 
 
 @pytest.mark.parametrize("board", BOARDS)
-def test_a_muted_source_is_unknown_in_all_sinks_and_the_others_go_on(board: str) -> None:
+def test_a_muted_source_is_unknown_in_all_sinks(board: str) -> None:
     sinks = flying(board)
     for _ in range(20):
         sinks.step()
@@ -290,7 +290,7 @@ def test_a_muted_source_is_unknown_in_all_sinks_and_the_others_go_on(board: str)
 
 
 @pytest.mark.parametrize("number", [20, 101, 102, 0x2000])
-def test_a_request_that_inav_does_not_answer_blanks_no_other_value(number: int) -> None:
+def test_an_unanswered_inav_request_blanks_only_its_values(number: int) -> None:
     """Without a ground station, so that polls are due once a second. 20 is asked before each mission list."""
     world = World(peer=MutedBoard(make_board("inav")))
     world.wait_ready(30)

@@ -153,7 +153,7 @@ def test_a_failed_commit_does_not_leave_the_next_attempt_uncertain() -> None:
     assert outcome[0][0].text == PushFailure.NO_ANSWER.value.text
 
 
-def test_a_board_that_reports_itself_armed_in_info_does_not_get_a_list() -> None:
+def test_a_list_is_not_written_if_info_reports_armed() -> None:
     """Its telemetry still says disarmed: polls are slower than INFO."""
     answers: dict[int, bytes] = {MissionCommand.BEGIN: WHOLE, MissionCommand.COMMIT: COMMITTED}
     _, station = found(FixedReplies(answers, INFO._replace(flags=InfoFlag.ARMED)))

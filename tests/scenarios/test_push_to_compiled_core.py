@@ -129,5 +129,5 @@ def test_a_power_cut_at_any_flash_operation_leaves_the_old_list() -> None:
     ],
     ids=["bit errors", "lost bytes", "flash fails twice", "flash fails", "resets", "arming"],
 )
-def test_faults_delay_or_fail_the_push_but_damage_no_list(inject: Inject, least: int) -> None:
+def test_faults_delay_or_fail_the_push_but_keep_lists_intact(inject: Inject, least: int) -> None:
     assert sum(push_under(inject, seed) for seed in range(4)) >= least

@@ -102,7 +102,7 @@ def test_a_client_waits_while_another_list_is_written(client: type[Client]) -> N
     assert world.stored == records_of(ITEMS)
 
 
-def test_a_client_that_repeats_the_last_item_does_not_get_requests_meanwhile() -> None:
+def test_a_repeated_last_item_does_not_trigger_requests() -> None:
     """Mission Planner: each request costs it one of its tries."""
     world = World(SimOptions(baud=9600), speeds=(9600,))
     world.wait_ready(60)

@@ -106,7 +106,7 @@ def test_an_unfinished_upload_is_cancelled_and_stored(world: World) -> None:
     assert world.stored == records_of(OLD)
 
 
-def test_no_transfer_is_started_while_stopping(world: World) -> None:
+def test_transfers_are_refused_while_stopping(world: World) -> None:
     station = GroundStation(world)
     stop(world)
     station.send(count_message(5))

@@ -188,7 +188,7 @@ def buttons() -> Iterator[Message]:
 @pytest.mark.parametrize(
     "kind", ["harakiri", "mavlink", "frsky", "unpatched", "inav", "old inav", "multiwii", "betaflight"]
 )
-def test_every_text_is_true_for_the_board_and_the_state(kind: str) -> None:
+def test_every_text_matches_the_board_and_the_state(kind: str) -> None:
     board = Board(kind)
     world, faults = started(board)
     station = GroundStation(world)

@@ -85,7 +85,7 @@ def times_shown(screens: Screens, text: str, began: float) -> int:
 
 
 class TestConnecting:
-    def test_a_healthy_craft_does_not_show_anything(self) -> None:
+    def test_a_healthy_craft_is_quiet(self) -> None:
         world = World(speeds=(115200,))
         world.wait_ready()
         _, screens = connected(world, 0)

@@ -63,7 +63,7 @@ def test_the_second_daemon_gets_the_process_id_of_the_first(tmp_path: Path) -> N
         assert [summary.number for summary in store.list(9)] == [2, 1]
 
 
-def test_of_many_processes_started_at_once_one_gets_the_lock(tmp_path: Path) -> None:
+def test_only_one_of_many_processes_gets_the_lock(tmp_path: Path) -> None:
     daemons = [start(tmp_path) for _ in range(5)]
     lines = [first_line(daemon) for daemon in daemons]
     for daemon in daemons:

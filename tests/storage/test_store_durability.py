@@ -34,9 +34,7 @@ while True:
 """
 
 
-def test_kill_9_does_not_lose_anything_that_was_acknowledged(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_kill_9_keeps_everything_acknowledged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "missions.db"
     chance = random.Random(1)
     acknowledged: dict[int, str] = {}

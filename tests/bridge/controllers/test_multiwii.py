@@ -48,7 +48,7 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     assert "WP 7: passes the ROI within 14 m: may end there" in texts
 
 
-def test_a_multiwii_that_arms_during_a_read_does_not_get_a_write() -> None:
+def test_a_multiwii_that_arms_during_a_read_is_not_written() -> None:
     """Not even the one that clears the record in RAM, although telemetry has not noticed arming yet."""
     multiwii = FakeMultiwii()
     world, station = found(multiwii)

@@ -39,17 +39,17 @@ def test_each_reason_is_one_short_sentence_or_none(phase: FlightPhase, reason: F
     assert (why is None) is by_the_pilot
 
 
-def test_a_reason_of_the_past_is_not_given() -> None:
+def test_an_outdated_reason_is_not_reported() -> None:
     assert flight_report(FlightProgress(reason=FlightReason.RTL), None).why is None
 
 
-def test_the_way_is_the_boards() -> None:
+def test_the_reported_leg_is_the_boards() -> None:
     report = flight_report(replace(FLYING, height_error=-1.5), None)
     assert report.way == Way(3.0, 9.0, -1.5)
     assert report.stage is None  # by its height
 
 
-def test_without_a_target_no_bearing_is_left_over() -> None:
+def test_the_bearing_is_cleared_without_a_target() -> None:
     assert flight_report(replace(FLYING, state=FlightPhase.SINK, distance=0.0), None).way == Way(0.0, 0.0, 0.0)
 
 
@@ -75,7 +75,7 @@ def test_an_emergency_landing_does_not_complete_the_list(reason: FlightReason) -
 @pytest.mark.parametrize(
     ("compass", "why"), [(None, ""), (-12.0, ""), (28.0, "30 deg"), (31.0, "30 deg"), (-44.0, "40 deg")]
 )
-def test_a_compass_error_is_said_once(compass: float | None, why: str) -> None:
+def test_a_compass_error_is_reported_once(compass: float | None, why: str) -> None:
     said = flight_report(replace(FLYING, compass=compass), None).why
     assert why in (said.text if said else "")
     assert (said is None) is (why == "")

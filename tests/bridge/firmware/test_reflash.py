@@ -77,7 +77,7 @@ def session_bytes() -> tuple[int, int]:
     return marks["reading"], bench.sent
 
 
-def test_a_flash_broken_off_anywhere_is_resumed_and_no_half_program_starts() -> None:
+def test_an_interrupted_flash_resumes_and_never_starts_half_a_program() -> None:
     read, total = session_bytes()
     dice = random.Random(2)
     for cut in sorted((dice.randrange(read), *dice.sample(range(read, total), 8))):

@@ -88,7 +88,7 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     assert "Too many uploads: wait a few seconds" in station.texts()
 
 
-def test_requests_from_strangers_are_not_passed_to_an_armed_board() -> None:
+def test_strangers_requests_do_not_reach_an_armed_board() -> None:
     """MISSION_CLEAR_ALL while armed once made it send eight times as much as telemetry does."""
     world = ready_world()
     stranger = GroundStation(world)

@@ -147,7 +147,7 @@ def test_messages_of_one_moment_share_datagrams() -> None:
     assert [frame.payload[4] for frame in frames] == [value.value for value in values]
 
 
-def test_a_station_silent_for_a_minute_does_not_get_more_messages() -> None:
+def test_a_station_silent_for_a_minute_stops_getting_messages() -> None:
     world = ready_world()
     station = GroundStation(world)
     station.send(gcs_heartbeat())
@@ -208,7 +208,7 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     assert everyone.messages("HEARTBEAT")
 
 
-def test_strangers_on_its_own_network_displace_no_station_that_sends_heartbeats() -> None:
+def test_local_strangers_do_not_displace_a_station_with_heartbeats() -> None:
     """Two thousand datagrams a second, from ports of one machine and from two hundred machines."""
     world = ready_world()
     pilot, late = (GroundStation(world, (f"192.168.4.{each}", 14550)) for each in (2, 3))
@@ -344,7 +344,7 @@ def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_any_payload_in_any_message_does_not_raise_anything(seed: int) -> None:
+def test_arbitrary_payloads_never_raise(seed: int) -> None:
     """Valid checksums around arbitrary contents: too short, too long, not a number, not text."""
     world = ready_world()
     station = GroundStation(world)

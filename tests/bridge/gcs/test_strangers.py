@@ -127,7 +127,7 @@ def is_harmless(message: Message, *, may_write: bool) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_stranger_on_an_open_link_neither_moves_nor_silences_the_craft(seed: int) -> None:
+def test_a_stranger_on_an_open_link_cannot_move_or_silence_the_craft(seed: int) -> None:
     world, autopilot = passing({})
     second, stranger = GroundStation(world, "second", sysid=SECOND_VEHICLE), GroundStation(world, "stranger")
     keep_alive(second)
@@ -271,7 +271,7 @@ def test_items_outside_a_list_need_a_proven_station(as_int: bool) -> None:
     assert [message.current for message in decoded(bytes(autopilot.received))] == [0, 1]
 
 
-def test_a_listener_asks_for_the_time_but_does_not_tell_it() -> None:
+def test_a_listener_may_ask_for_the_time_but_not_set_it() -> None:
     world, autopilot = passing({"udp": LinkAccess(signing())})
     stranger = GroundStation(world)
     for tc1, ts1 in ((0, 5), (7, 0), (7, 5), (-1, 5)):
@@ -280,7 +280,7 @@ def test_a_listener_asks_for_the_time_but_does_not_tell_it() -> None:
     assert [(message.tc1, message.ts1) for message in decoded(bytes(autopilot.received))] == [(0, 5)]
 
 
-def test_passing_everything_gives_listeners_no_more() -> None:
+def test_pass_through_of_everything_excludes_listeners() -> None:
     """The setting is for links that require nothing."""
     world, autopilot = passing({"keyed": LinkAccess(signing())}, everything=True)
     listener, other_station = on_link(GroundStation(world, "listener"), "keyed"), GroundStation(world, "other", sysid=7)

@@ -76,7 +76,7 @@ def test_no_other_reply_is_read_late(urgent: Send) -> None:
     assert asking(poll(Msp.STATUS), poll(Msp.RC), urgent).complete_at == -inf
 
 
-def test_does_not_read_anything_late_while_no_reply_is_awaited() -> None:
+def test_reads_at_once_while_a_reply_is_not_expected() -> None:
     link = asking(poll(Msp.STATUS), poll(Msp.RC))
     link.receive(reply(Msp.STATUS) + reply(Msp.RC), NOW + 0.01)
     assert link.complete_at == -inf
@@ -90,7 +90,7 @@ def test_a_slow_line_is_read_every_20_ms() -> None:
     assert asking(poll(Msp.STATUS), poll(Msp.RC), baud=2400).complete_at <= NOW + 0.05
 
 
-def test_does_not_read_anything_late_while_a_request_waits_for_room() -> None:
+def test_reads_at_once_while_a_request_waits_for_room() -> None:
     link = asking(poll(Msp.STATUS), poll(Msp.RC))
     link.send(Send(request(Msp.IDENT), Msp.IDENT, 224), NOW)
     assert link.awaits(Msp.IDENT)

@@ -203,7 +203,7 @@ def test_a_reply_ends_earlier_requests() -> None:
     assert link.requests_lost == 2
 
 
-def test_does_not_send_anything_alongside_an_exclusive_request() -> None:
+def test_an_exclusive_request_is_sent_alone() -> None:
     link = MspLink(115200, [], 0.0)
     link.send(question(191, 7, exclusive=True), 0.0)
     link.send(question(101, 11), 0.0)

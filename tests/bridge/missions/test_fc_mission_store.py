@@ -134,7 +134,7 @@ def test_an_accepted_list_is_stored_and_read_back_by_all(craft: Craft) -> None:
     assert Download(another).run(TIMEOUT_S) == craft.download()
 
 
-def test_writing_a_read_list_again_does_not_change_anything(craft: Craft) -> None:
+def test_writing_a_read_list_again_keeps_the_records(craft: Craft) -> None:
     assert craft.upload(craft.plan(12)) is ACCEPTED
     before = craft.pull()
     assert craft.upload(craft.download()) is ACCEPTED
@@ -160,7 +160,7 @@ def test_a_cleared_list_reads_as_empty_and_can_be_replaced(craft: Craft) -> None
     assert craft.holds(craft.plan(7))
 
 
-def test_a_rejected_list_does_not_change_anything_and_has_a_reason(craft: Craft) -> None:
+def test_a_rejected_list_keeps_the_mission_and_has_a_reason(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     good = craft.plan(6, 1)
     for bad in (

@@ -33,7 +33,7 @@ from tests.support.rule_items import (
 )
 
 
-def test_no_items_clear_the_list() -> None:
+def test_an_empty_upload_clears_the_list() -> None:
     verdict = check_list([], PROFILE)
     assert (verdict.result, verdict.ack, verdict.records) == (Result.CLEARED, MissionResult.ACCEPTED, ())
 
@@ -153,7 +153,7 @@ def test_a_rejection_comes_with_the_item_and_is_final(seq: int, faulty: MissionI
     assert (verdict.result, verdict.findings[-1]) == (Result.REJECTED, answers[seq].finding)  # type: ignore[union-attr]
 
 
-def test_an_incomplete_list_does_not_have_a_verdict() -> None:
+def test_an_incomplete_list_cannot_be_judged() -> None:
     check = HarakiriCheck(PROFILE, 3)
     check.take(HOME)
     check.take(item(WAYPOINT))

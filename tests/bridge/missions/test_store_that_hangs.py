@@ -76,7 +76,7 @@ def test_the_flight_controller_is_still_found_and_read() -> None:
     assert len(Download(GroundStation(world)).run(10)) == 5
 
 
-def test_a_list_whose_board_is_gone_when_the_store_answers_is_not_kept() -> None:
+def test_a_list_is_dropped_if_the_board_leaves_before_the_store_answers() -> None:
     world, _ = holding()
     world.inside.missions.held = None
     world.store.delay_s = 2.0

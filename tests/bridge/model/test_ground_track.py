@@ -41,13 +41,13 @@ def test_the_date_line_is_crossed_the_short_way() -> None:
 
 
 @given(start=PLACES, end=PLACES, share=st.floats(0, 1))
-def test_a_leg_passes_its_own_ends(start: Place, end: Place, share: float) -> None:
+def test_a_leg_contains_both_ends(start: Place, end: Place, share: float) -> None:
     assert passing_distance_m(start, end, start) == pytest.approx(0, abs=0.01)
     assert passing_distance_m(start, end, end) == pytest.approx(0, abs=0.01)
     assert 0 <= bearing_deg(start, end) < 360
 
 
-def test_a_place_beside_a_leg_is_as_far_as_the_nearest_point() -> None:
+def test_the_distance_to_a_leg_is_that_to_the_nearest_point() -> None:
     start, end = Place(), Place(LAT + 100 * METRE)
     beside = Place(LAT + 50 * METRE, LON + 2000)
     assert passing_distance_m(start, end, beside) == pytest.approx(distance_m(Place(beside.lat_e7), beside), rel=0.01)

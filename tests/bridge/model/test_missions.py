@@ -48,5 +48,5 @@ def test_a_finished_mission_is_complete() -> None:
     assert progress.progress is Progress.COMPLETE
 
 
-def test_an_empty_mission_does_not_have_a_last_item() -> None:
+def test_an_empty_mission_lacks_a_last_item() -> None:
     assert FlownMission().counted(()) == (0, 0)

@@ -51,7 +51,7 @@ def test_a_value_out_of_range_is_refused_with_the_range_and_without_a_request(na
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_armed_it_does_not_change_or_save_anything(name: str) -> None:
+def test_settings_cannot_be_changed_or_saved_while_armed(name: str) -> None:
     board = BOARDS[name]
     faults = Faults()
     world, client = ready(board, faults)
@@ -156,7 +156,7 @@ def test_a_change_on_the_board_itself_is_found_by_the_seal_and_read() -> None:
     assert client.value("ROLL_P") == 77
 
 
-def test_while_a_mission_arrives_it_does_not_change_anything() -> None:
+def test_changes_are_refused_while_a_mission_arrives() -> None:
     world, client = ready(BOARDS["patched Harakiri"])
     station = GroundStation(world)
     station.send(messages.MAVLink_mission_count_message(1, 1, 5, 0))
@@ -174,7 +174,7 @@ def test_settings_are_unknown_without_a_board() -> None:
     assert isinstance(result, SettingRefusal)
 
 
-def test_a_board_that_is_lost_in_the_middle_of_a_change_ends_it() -> None:
+def test_losing_the_board_ends_a_change() -> None:
     world, _ = ready(BOARDS["patched Harakiri"])
     results: list[Answer] = []
     settings = inside(world.bridge).board_settings

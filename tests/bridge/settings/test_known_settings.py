@@ -292,7 +292,7 @@ def test_readings_wait_for_the_end_of_a_transfer() -> None:
     assert max(at for at, command in enumerate(asked) if command == MissionCommand.COMMIT) < asked.index(SETTING)
 
 
-def test_a_few_requests_a_minute() -> None:
+def test_it_sends_a_few_requests_a_minute() -> None:
     for make in (naze, inav, multiwii):
         world, _ = sealed(make)
         began = world.now
@@ -329,7 +329,7 @@ def occasions(world: World) -> list[str]:
     return [backup.occasion.value for backup in world.backups]
 
 
-def test_a_board_that_is_met_is_backed_up_whole() -> None:
+def test_a_new_board_is_backed_up() -> None:
     world, client = ready(BOARDS["patched Harakiri"])
     world.wait_until(lambda world: bool(world.backups), 20)
     (backup,) = world.backups

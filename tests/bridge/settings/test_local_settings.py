@@ -105,7 +105,7 @@ def test_a_value_that_only_the_board_refuses_is_left_out() -> None:
 
 @pytest.mark.parametrize("name", CHANGES)
 @pytest.mark.parametrize("fault", ["arms", "cable"])
-def test_a_fault_in_the_middle_does_not_save_anything_and_says_what_was_changed(name: str, fault: str) -> None:
+def test_a_fault_prevents_the_save_and_names_the_changes(name: str, fault: str) -> None:
     faults = Faults()
     world, client = ready(BOARDS[name], faults)
     before = values(client.wait_read())
@@ -131,7 +131,7 @@ def test_a_fault_in_the_middle_does_not_save_anything_and_says_what_was_changed(
     assert values(client.current()) == before
 
 
-def test_a_cable_pulled_during_the_save_leaves_the_outcome_open() -> None:
+def test_pulling_the_cable_during_the_save_leaves_the_outcome_open() -> None:
     world, _ = ready(BOARDS[NAZE])
     result = outcome(
         restored(world, {"p_roll": 44.0}, "", lambda _count: world.after(0.03, world.unplug)),
@@ -181,7 +181,7 @@ def test_one_restore_runs_at_a_time() -> None:
     assert outcome(restored(world, {"p_roll": 50.0})).is_saved
 
 
-def test_another_clients_change_in_the_middle_prevents_the_save() -> None:
+def test_another_clients_change_prevents_the_save() -> None:
     world, _ = ready(BOARDS[NAZE])
 
     def progress(count: int) -> None:
@@ -203,7 +203,7 @@ def test_the_plan_from_memory_does_not_ask_the_board() -> None:
     assert len(world.written) == before
 
 
-def test_without_a_board_it_does_not_plan_anything() -> None:
+def test_a_plan_needs_a_board() -> None:
     world = World(powered=False)
     found: list[object] = []
     world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)

@@ -39,7 +39,7 @@ def test_all_names_are_short_and_distinct() -> None:
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_no_two_settings_of_a_board_are_one_parameter(name: str) -> None:
+def test_parameter_names_of_a_board_are_unique(name: str) -> None:
     world, client = ready(BOARDS[name])
     settings = [setting.name for setting in client.wait_read()]
     own = world.inside.parameters._own.values()
@@ -75,7 +75,7 @@ def test_names_that_would_coincide_get_a_checksum() -> None:
     assert all(len(name) <= 16 for name in names)
 
 
-def test_a_name_depends_on_no_other_setting_of_another_name() -> None:
+def test_a_short_name_is_independent_of_other_settings() -> None:
     alone = {name: parameter for setting in INAV for parameter, name in parameter_names([setting]).items()}
     together = {name: parameter for parameter, name in parameter_names(INAV).items()}
     assert sum(alone[name] != together[name] for name in INAV) == 0

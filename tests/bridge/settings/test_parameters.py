@@ -127,7 +127,7 @@ def test_qgroundcontrol_is_ready_before_a_flight_controller_is_found() -> None:
 
 
 @pytest.mark.parametrize(("blocker", "name"), [(13, "INS_ACCOFFS_X"), (12, "COMPASS_OFS_X")])
-def test_a_sensor_that_inav_reports_as_not_calibrated_does_not_have_an_offset(blocker: int, name: str) -> None:
+def test_an_uncalibrated_inav_sensor_has_offset_0(blocker: int, name: str) -> None:
     faults = Faults(boxes=0)
     world = World(faults=faults, peer=make_board("inav", faults=faults))
     world.wait_ready()
@@ -371,7 +371,7 @@ def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [(b"P_ROLL", 201.0), (b"NO_SUCH_NAME", 1.0), (b"SYSID_THISMAV", 7.0)])
-def test_a_save_after_a_refused_change_writes_and_does_not_say_anything(name: bytes, value: float) -> None:
+def test_a_save_after_a_refused_change_is_silent(name: bytes, value: float) -> None:
     """Mission Planner asks for it by itself, 10 s after any PARAM_SET."""
     world, station = settled_world()
     operations = world.naze.flash_operations

@@ -80,7 +80,7 @@ def test_a_save_ends_without_settings() -> None:
 @pytest.mark.parametrize(
     ("arm_bit", "reply", "refused"), [(ARM_BIT, status(1 << ARM_BIT), ARMED), (None, status(0), NO_ANSWER)]
 )
-def test_a_board_that_is_armed_or_does_not_have_an_arm_flag_is_not_written(
+def test_a_board_that_is_armed_or_lacks_an_arm_flag_is_not_written(
     arm_bit: int | None, reply: MspFrame, refused: SettingRefusal
 ) -> None:
     work = change()

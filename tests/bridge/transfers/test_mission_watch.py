@@ -180,7 +180,7 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
     assert not [text for text in station.texts() if "changed" in text]
 
 
-def test_polling_an_empty_multiwii_does_not_report_anything() -> None:
+def test_polling_an_empty_multiwii_does_not_report_changes() -> None:
     _, world, station = board_with("multiwii")
     before = len(world.written)
     world.run(5)

@@ -31,7 +31,7 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     assert "A mission can only be written as a whole" in station.texts()
 
 
-def test_a_repeated_last_item_does_not_get_a_reply_until_the_final_ack() -> None:
+def test_a_repeated_last_item_is_answered_by_the_final_ack() -> None:
     world, station = holding(SimOptions(flash_erase_ms=1200))
     items = waypoints(146)
     receiving(world, station, items, 146)
@@ -83,7 +83,7 @@ def test_the_final_ack_is_repeated_before_the_station_can_go_on() -> None:
 
 
 @pytest.mark.parametrize("next_message", [list_message(), count_message(5), ack_message(A.ACCEPTED)])
-def test_a_station_that_went_on_does_not_get_another_final_ack(next_message: Message) -> None:
+def test_a_station_that_continues_gets_a_single_final_ack(next_message: Message) -> None:
     world, station = holding()
     station.send(QGC_HEARTBEAT)
     receiving(world, station, waypoints(8), 8)
@@ -93,7 +93,7 @@ def test_a_station_that_went_on_does_not_get_another_final_ack(next_message: Mes
     assert len([at for at, message in station.received if message.get_type() == "MISSION_ACK"]) == 1
 
 
-def test_an_item_that_crosses_the_final_ack_does_not_get_another_ack() -> None:
+def test_an_item_that_crosses_the_final_ack_is_ignored() -> None:
     """The bridge has requested it again while it wrote the list, or the network has doubled it."""
     world, station = holding()
     items = waypoints(8)

@@ -126,7 +126,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     assert world.naze.counters.flash_writes == 2
 
 
-def test_does_not_clear_anything_while_armed() -> None:
+def test_refuses_to_clear_while_armed() -> None:
     world, station = holding()
     world.faults.armed = True
     world.run(1)
@@ -284,7 +284,7 @@ def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
     assert world.inside.ground.station(station.peer) is None
 
 
-def test_a_complete_list_whose_turn_does_not_come_is_denied() -> None:
+def test_a_complete_list_that_waits_too_long_is_denied() -> None:
     world, station = holding()
     receiving(world, station, waypoints(8), 7)
     hanging_push(world)
@@ -410,7 +410,7 @@ def test_a_list_takes_the_place_of_a_waiting_clear() -> None:
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
-def test_a_list_does_not_get_an_ack_once_the_station_has_announced_another(announce: Message) -> None:
+def test_a_new_count_suppresses_the_ack_of_the_previous_list(announce: Message) -> None:
     world, station = holding()
     receiving(world, station, waypoints(146, 1), 146)
     world.run(0.05)
@@ -633,7 +633,7 @@ def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.1, 2.0])
-def test_a_cancel_that_crosses_a_refusal_does_not_erase_anything(late_s: float) -> None:
+def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> None:
     world, station = holding()
     items = waypoints(8)
     items[5] = replace(items[5], command=21)  # LAND must be last
@@ -661,7 +661,7 @@ def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     assert world.stored == ()
 
 
-def test_a_late_cancel_does_not_erase_anything() -> None:
+def test_a_late_cancel_keeps_the_mission() -> None:
     world, station = holding()
     items = waypoints(30)
     receiving(world, station, items, 30)
@@ -696,7 +696,7 @@ def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:
     assert world.store.outcomes() == [Outcome.REJECTED]
 
 
-def test_a_list_with_every_item_dropped_clears_and_says_so() -> None:
+def test_dropping_every_item_clears_with_a_message() -> None:
     world, station = holding()
     items = waypoints(2)
     items[1] = replace(items[1], command=178)
@@ -829,7 +829,7 @@ def test_late_wake_ups_do_not_lose_items(late_s: float) -> None:
         world.assert_line_was_clean()
 
 
-def test_a_flood_of_requests_fills_no_queue() -> None:
+def test_a_flood_of_requests_does_not_fill_queues() -> None:
     """The world checks the queue of conversations; the other queues are checked here."""
     world, station = holding()
     for number in range(3000):

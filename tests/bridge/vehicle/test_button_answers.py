@@ -60,7 +60,7 @@ def test_every_action_is_answered_by_a_text(action: str) -> None:
     assert len(text.text) <= 50
 
 
-def test_a_refused_command_is_not_a_banner_beside_the_dialog_of_qgroundcontrol() -> None:
+def test_a_refusal_in_qgroundcontrol_is_a_dialog_without_a_banner() -> None:
     world, station = connected()
     screen = Screens(station).qgc
     station.heartbeat = QGC_HEARTBEAT
@@ -92,7 +92,7 @@ def test_both_messages_of_a_button_of_mission_planner_have_the_same_answer(numbe
 
 
 @pytest.mark.parametrize("number", [519, 521, 525, 2504])
-def test_requests_of_the_program_itself_do_not_get_a_text(number: int) -> None:
+def test_a_programs_own_requests_are_refused_silently(number: int) -> None:
     world, station = connected()
     station.send(command(number))
     world.run(0.5)
@@ -127,7 +127,7 @@ def test_messages_without_an_acknowledgement_are_answered_once(message: Message,
     assert station.messages("MISSION_COUNT")
 
 
-def test_a_plan_with_only_a_fence_clears_the_mission_and_says_both() -> None:
+def test_a_plan_with_only_a_fence_clears_the_mission_with_two_notes() -> None:
     """QGroundControl writes its mission as an empty list, and leaves out the fence that is not stored here."""
     world, station = connected()
     items = waypoints(5)

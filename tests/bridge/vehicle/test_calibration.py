@@ -110,7 +110,7 @@ def test_the_compass_page_follows_a_harakiri_to_the_end() -> None:
     assert pages.acks(ACCEPT_MAG_CAL) == [ACCEPTED]
 
 
-def test_a_frozen_compass_calibration_cannot_be_cancelled_and_says_so() -> None:
+def test_cancelling_a_frozen_compass_calibration_is_refused() -> None:
     pages = CalibrationPages()
     pages.command(CANCEL_MAG_CAL)  # QGroundControl asks in this way if there is such a calibration
     pages.world.run(0.2)
@@ -138,7 +138,7 @@ def test_a_compass_calibration_cut_by_a_reset_has_failed() -> None:
     assert any("Compass calibration failed" in text for text in pages.station.texts())
 
 
-def test_a_board_that_never_answers_again_is_lost_in_the_end() -> None:
+def test_a_board_that_stays_silent_is_lost() -> None:
     pages = CalibrationPages()
     pages.start_compass()
     pages.world.run(5)

@@ -256,7 +256,7 @@ def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
     assert [ack.type for ack in right.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
 
 
-def test_a_refused_request_for_rates_does_not_get_a_text() -> None:
+def test_a_refusal_of_rates_is_silent() -> None:
     """Every ground station sends some when it connects, and every radio its status."""
     world = keyed()
     station = GroundStation(world)
@@ -270,7 +270,7 @@ def test_a_refused_request_for_rates_does_not_get_a_text() -> None:
 
 
 @pytest.mark.parametrize("access", [LinkAccess(signing(), LINK_ID), LinkAccess(may_write=lambda peer: "pilot" in peer)])
-def test_a_listener_does_not_get_texts_for_others(access: LinkAccess) -> None:
+def test_texts_for_others_do_not_reach_a_listener(access: LinkAccess) -> None:
     world = World(speeds=(115200,), links={"udp": access})
     world.wait_ready()
     pilot = signing_station(world, "pilot")
@@ -381,7 +381,7 @@ def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> 
     assert MissionResult.DENIED not in [ack.type for ack in station.messages("MISSION_ACK")]
 
 
-def test_setting_the_clock_back_repeats_no_timestamp() -> None:
+def test_setting_the_clock_back_does_not_repeat_timestamps() -> None:
     clock = Clock()
     world = keyed(signing(clock))
     station = signing_station(world)

@@ -122,7 +122,7 @@ def test_a_write_is_not_a_reason_not_to_arm() -> None:
     assert not any(text.startswith("PreArm") for text in station.texts())
 
 
-def test_the_end_of_all_reasons_is_not_a_failure_to_qgroundcontrol() -> None:
+def test_the_end_of_all_reasons_is_info_for_qgroundcontrol() -> None:
     """Which takes each text that begins with PreArm for one."""
     world = blocked()
     station = GroundStation(world)

@@ -115,7 +115,7 @@ def results(station: GroundStation) -> list[int]:
     return [ack.result for ack in station.messages("COMMAND_ACK") if ack.command == SET_CURRENT]
 
 
-def test_the_craft_flies_to_the_item_and_on_from_there() -> None:
+def test_the_craft_flies_to_the_item_and_continues() -> None:
     flight = Flight().begin()
     other = GroundStation(flight.world, "other", sysid=254)
     other.stay_connected()
@@ -239,7 +239,7 @@ def test_only_one_request_runs_at_a_time_and_repeats_are_not_sent() -> None:
     assert "Set WP: another request is running, try again" in flight.station.texts()
 
 
-def test_a_client_that_repeats_the_request_does_not_get_another_item() -> None:
+def test_a_repeated_request_gets_the_same_item() -> None:
     """MAVSDK, which requests no streams."""
     flight = Flight().begin()
     flight.world.run_until(lambda _: bool(flight.current()), 2)
@@ -288,7 +288,7 @@ def test_a_station_that_may_only_read_does_not_set_a_waypoint() -> None:
     assert flight.number == 3
 
 
-def test_without_a_known_mission_it_does_not_send_anything() -> None:
+def test_an_unknown_mission_is_not_sent() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.WP else "")
     inav.records, inav.is_valid, inav.armed = [FAKE], True, True
     world = World(speeds=(115200,), peer=inav, links=LINKS)

@@ -133,7 +133,7 @@ def test_harakiri_does_not_send_a_course_or_dilution() -> None:
     assert (raw["cog"], raw["eph"], raw["epv"], raw["time_usec"]) == (U16, U16, U16, 5000)
 
 
-def test_a_first_fix_in_motion_does_not_have_a_direction_yet() -> None:
+def test_the_first_fix_in_motion_lacks_a_direction() -> None:
     state = with_replies(Vehicle(), HARAKIRI, STATUS=status(), ALTITUDE=struct.pack("<ih", 150, 20), RAW_GPS=gps())
     assert at(state).made(make.global_position_int) == []
     with_replies(state, HARAKIRI, RAW_GPS=gps(lat=453838000 + 90))  # a metre to the north

@@ -108,7 +108,7 @@ def test_watched_groups_are_polled_and_published_with_each_reply() -> None:
     assert world.take_published() == set()
 
 
-def test_the_age_of_a_value_grows_while_the_bridge_does_not_hear_anything() -> None:
+def test_a_values_age_grows_while_the_line_is_silent() -> None:
     world, autopilot, _ = passing()
     world.bridge.watch(Group)
     autopilot.send(m.MAVLink_attitude_message(1, 0.25, 0, 0, 0, 0, 0))

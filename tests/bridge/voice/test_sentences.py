@@ -53,14 +53,14 @@ def test_only_a_failure_begins_with_prearm_on_other_stations_than_mission_planne
         assert failures == {"NOT_READY"} | ({"READY"} if kind is Kind.MISSION_PLANNER else set())
 
 
-def test_a_command_that_is_not_supported_is_no_failed_check() -> None:
+def test_an_unsupported_command_is_not_a_failed_check() -> None:
     """QGroundControl takes a text that begins with "preflight" as one."""
     happening = Happening(TABLE["NO_EFFECT"], ("PREFLIGHT_CALIBRATION",))
     for kind in Kind:
         assert [text for _, text in rendered(happening, kind)] == ["Not supported: PREFLIGHT_CALIBRATION"]
 
 
-def test_no_text_is_twice_in_the_table() -> None:
+def test_texts_in_the_table_are_unique() -> None:
     texts = Counter((sentence.severity, sentence.text) for sentence in TABLE.values() if sentence.text != "{}")
     assert [text for text, count in texts.items() if count > 1] == []
 

@@ -76,7 +76,7 @@ def test_the_next_write_ends_the_repetition() -> None:
     assert news.again(Kind.MISSION_PLANNER, 10.0) == []
 
 
-def test_a_refusal_is_said_once_for_each_attempt() -> None:
+def test_a_refusal_is_reported_once_for_each_attempt() -> None:
     """Mission Planner repeats a request seven times, 0.7 s apart, and Resume Mission its commands each second."""
     news = BadNews()
     for interval_s in (0.7, 1.1):

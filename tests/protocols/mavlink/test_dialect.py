@@ -61,7 +61,7 @@ def test_frames_of_all_messages_are_found_with_their_targets(version: int) -> No
             assert frame.target == named, kind.msgname
 
 
-def test_a_mavlink_1_frame_without_extensions_does_not_have_a_target_in_them() -> None:
+def test_a_mavlink_1_frame_without_extensions_lacks_their_target() -> None:
     """COMMAND_ACK's target is an extension, which MAVLink 1 cannot carry."""
     ack = mavlink_1.MAVLink_command_ack_message(400, 0)
     raw = bytes(ack.pack(mavlink_1.MAVLink(None, srcSystem=7, srcComponent=8)))
@@ -83,7 +83,7 @@ def test_our_frames_of_all_messages_are_those_of_pymavlink(msgid: int, fill: int
         assert FrameWriter(7, 8).frame(pack(message), 1) == without_extensions
 
 
-def test_the_import_of_pymavlink_does_not_have_side_effects() -> None:
+def test_importing_pymavlink_has_no_side_effects() -> None:
     """mavutil would set environment variables, and load numpy and a second dialect."""
     program = "import os, sys; before = {**os.environ}; import protocols.mavlink.codec; print(*sys.modules)"
     program += "; assert before == {**os.environ}"

@@ -126,7 +126,7 @@ FRAME = telemetry("MAVLink 2", 2, 0)[1]
         bytes((0xFE, 255, 1, 1, 1, 3)),
     ],
 )
-def test_an_impossible_header_does_not_delay_anything(header: bytes) -> None:
+def test_an_impossible_header_does_not_delay_frames(header: bytes) -> None:
     assert [frame.raw for frame in MavlinkSplitter().feed(header + FRAME)] == [FRAME]
 
 

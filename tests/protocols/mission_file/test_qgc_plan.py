@@ -114,7 +114,7 @@ def test_an_ignored_fence_is_noted(part: dict[str, Any], notes: list[str]) -> No
     assert noted == notes
 
 
-def test_a_survey_becomes_the_items_that_fly_it() -> None:
+def test_a_survey_becomes_flyable_items() -> None:
     survey = {
         "type": "ComplexItem",
         "complexItemType": "survey",

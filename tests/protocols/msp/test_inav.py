@@ -46,6 +46,6 @@ def test_a_current_below_zero_stays_negative() -> None:
     assert (analog.cells, analog.battery_cv, analog.current_ca, analog.drawn_mah) == (4, 1630, -5, -12)
 
 
-def test_a_clock_that_inav_does_not_know_is_zero() -> None:
+def test_an_unset_inav_clock_is_zero() -> None:
     assert decode_rtc(bytes(6)) == 0
     assert decode_rtc(struct.pack("<IH", 1_790_000_000, 500)) == 1_790_000_000.5

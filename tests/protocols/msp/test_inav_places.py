@@ -53,7 +53,7 @@ def test_an_approach_names_the_directions_of_landing(headings: tuple[int, int], 
     assert approach._replace(headings=headings).directions() == directions
 
 
-def test_an_empty_zone_does_not_have_vertices() -> None:
+def test_an_empty_zone_has_0_vertices() -> None:
     head = decode_geozone(empty_geozone(9))
     assert head is not None
     assert (head.number, head.vertices) == (9, 0)

@@ -30,7 +30,7 @@ def test_a_mode_is_shown_with_channel_and_pulses() -> None:
     wanted=RANGES,
     number=st.integers(1, 3),
 )
-def test_a_mode_gets_the_ranges_written_and_no_other_mode_changes(
+def test_writing_a_modes_ranges_leaves_other_modes(
     held: list[bytes], wanted: list[tuple[int, int, int]], number: int
 ) -> None:
     payload = b"".join(held)

@@ -57,7 +57,7 @@ def test_bad_bytes_are_rejected_or_a_whole_reply(payload: bytes) -> None:
 
 
 @given(held_settings(), st.integers(0, 65535), st.integers(0, 2**32 - 1))
-def test_requests_do_not_have_a_hazard_byte(held: HeldSetting, index: int, checksum: int) -> None:
+def test_requests_are_free_of_hazard_bytes(held: HeldSetting, index: int, checksum: int) -> None:
     assert is_clean(encode_set_setting(index, held.setting, held.value))
     assert is_clean(encode_read_settings(index, index))
     assert is_clean(encode_save(checksum))

@@ -22,7 +22,7 @@ LEAST: list[tuple[Callable[[bytes], object], bytes]] = [
 
 
 @pytest.mark.parametrize(("decode", "payload"), LEAST)
-def test_shorter_is_unknown_and_longer_is_accepted(decode: Callable[[bytes], object], payload: bytes) -> None:
+def test_a_short_reply_is_unknown_and_a_long_reply_accepted(decode: Callable[[bytes], object], payload: bytes) -> None:
     assert decode(payload) is not None
     for size in range(len(payload)):
         assert decode(payload[:size]) is None
@@ -65,7 +65,7 @@ def test_the_current_is_read_if_present() -> None:
 
 
 @pytest.mark.parametrize(("sent", "kept"), [(4, 4), (8, 8), (10, 10), (18, 18), (34, 18)])
-def test_no_more_channels_are_read_than_mavlink_has(sent: int, kept: int) -> None:
+def test_reads_at_most_the_channels_of_mavlink(sent: int, kept: int) -> None:
     assert t.decode_channels(struct.pack(f"<{sent}H", *range(1000, 1000 + sent))) == tuple(range(1000, 1000 + kept))
 
 

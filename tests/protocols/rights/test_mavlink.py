@@ -21,7 +21,7 @@ def frame(message: mavlink.MAVLink_message) -> MavlinkFrame:
 
 
 @given(command=st.integers(0, 65535).filter(lambda number: number not in COMMANDS))
-def test_a_command_without_a_row_moves_the_craft(command: int) -> None:
+def test_an_unlisted_command_counts_as_a_move(command: int) -> None:
     long = mavlink.MAVLink_command_long_message(1, 1, command, 0, 0, 0, 0, 0, 0, 0, 0)
     whole = mavlink.MAVLink_command_int_message(1, 1, 0, command, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     assert effect_of(frame(long)) is effect_of(frame(whole)) is Effect.MOVE
@@ -31,7 +31,7 @@ def test_a_command_without_a_row_moves_the_craft(command: int) -> None:
     ("interval_us", "effect"),
     [(0, Effect.RATE), (1e6, Effect.RATE), (-1, Effect.SILENCE), (1e7, Effect.SILENCE), (math.nan, Effect.SILENCE)],
 )
-def test_a_message_that_would_come_less_than_once_a_second_is_silenced(interval_us: float, effect: Effect) -> None:
+def test_an_interval_above_one_second_counts_as_silence(interval_us: float, effect: Effect) -> None:
     number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     assert (
         effect_of(frame(mavlink.MAVLink_command_long_message(1, 1, number, 0, 30, interval_us, 0, 0, 0, 0, 0)))
@@ -40,7 +40,7 @@ def test_a_message_that_would_come_less_than_once_a_second_is_silenced(interval_
 
 
 @pytest.mark.parametrize(("current", "effect"), [(0, Effect.CHANGE), (1, Effect.CHANGE), (2, Effect.MOVE)])
-def test_an_item_that_is_flown_to_at_once_is_not_an_upload(current: int, effect: Effect) -> None:
+def test_a_guided_item_is_not_an_upload(current: int, effect: Effect) -> None:
     item = mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 1, 0, 0, 0, 0, 0, 0, 0.0)
     assert effect_of(frame(item)) is effect
 

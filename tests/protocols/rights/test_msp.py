@@ -117,7 +117,7 @@ def test_every_command_of_the_bridge_is_among_them() -> None:
 
 
 @pytest.mark.parametrize("firmware", Firmware)
-def test_a_frame_within_a_frame_does_not_have_a_row(firmware: Firmware) -> None:
+def test_a_nested_frame_is_refused(firmware: Firmware) -> None:
     assert all(msp_right(firmware, 255, bytes(size)).effect is Effect.UNKNOWN for size in range(256))
 
 
@@ -127,7 +127,7 @@ def test_v2_is_sent_only_to_boards_that_speak_it(firmware: Firmware) -> None:
     assert max(MSP_RIGHTS[firmware]) < 255
 
 
-def test_of_waypoints_only_home_reads_everywhere() -> None:
+def test_only_waypoint_0_is_readable_on_every_firmware() -> None:
     effects = [msp_right(Firmware.UNKNOWN, Nav.WP, bytes((number,))).effect for number in range(256)]
     assert effects == [Effect.READ] + [Effect.UNKNOWN] * 255
 

@@ -130,7 +130,7 @@ def test_items_keep_their_partners_where_numbers_differ(tmp_path: Path) -> None:
         assert any(row.split()[:2] == words for row in rows), words
 
 
-def test_values_that_no_board_gave_are_named(tmp_path: Path, files: dict[str, Path]) -> None:
+def test_assumed_values_are_listed(tmp_path: Path, files: dict[str, Path]) -> None:
     saved = tmp_path / "diff.txt"
     saved.write_text("set nav_wp_max_safe_distance = 300\n")
     place = ["--home", "45.3838,8.4733"]

@@ -183,7 +183,7 @@ def test_a_checksum_looks_the_same_everywhere(daemon: Daemon, tmp_path: Path) ->
     } == {daemon.pull()["checksum"]}
 
 
-def test_tables_fit_and_do_not_have_a_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
+def test_tables_fit_without_trailing_spaces(daemon: Daemon, tmp_path: Path) -> None:
     far = replace(waypoint(1), lat=-45.3838, lng=-178.4733, alt=1000.5, p1=400.5)
     plan = [HOME, replace(far, command=Command.NAV_LOITER_TIME), far, PlanRow(Command.NAV_RETURN_TO_LAUNCH, alt=15)]
     file = write_plan(tmp_path / "plan", plan)

@@ -22,7 +22,7 @@ def test_status_shows_the_flight_controller_and_the_address(daemon: Daemon) -> N
     assert lines["Connect to"].strip() == f"UDP 127.0.0.1, port {daemon.port}"
 
 
-def test_a_page_that_cannot_be_opened_is_said_to_be(daemon: Daemon) -> None:
+def test_a_page_that_cannot_be_opened_is_reported(daemon: Daemon) -> None:
     facts = daemon.status()
     assert facts is not None
     taken = facts | {"page": "0.0.0.0:8080", "page_trouble": "Address already in use"}

@@ -37,7 +37,7 @@ def test_a_missing_mission_is_reported_in_one_sentence(daemon: Daemon) -> None:
     assert_one_sentence(ask(daemon, "missions", "show", "2147483647"), 1, "there is no mission 2147483647")
 
 
-def test_an_empty_store_is_said_to_be_empty(tmp_path: Path) -> None:
+def test_an_empty_store_is_reported_as_empty(tmp_path: Path) -> None:
     with ExitStack() as stack:
         daemon = Starter(tmp_path, stack).daemon("sim:")
         daemon.wait_up()

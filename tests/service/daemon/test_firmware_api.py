@@ -34,7 +34,7 @@ def test_a_wrong_image_is_refused_first(daemon: Daemon, what: str, image: bytes,
         ask_daemon(daemon.state_dir, request)
 
 
-def test_a_board_on_no_serial_port_is_refused(daemon: Daemon) -> None:
+def test_a_board_without_a_serial_port_is_refused(daemon: Daemon) -> None:
     request = {"do": "flash-firmware", "image": base64.b64encode(PATCHED).decode(), "battery": True}
     with pytest.raises(ControlError, match="Nothing was changed: sim: is not a serial port"):
         ask_daemon(daemon.state_dir, request)

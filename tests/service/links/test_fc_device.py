@@ -50,7 +50,7 @@ async def test_received_bytes_are_acknowledged_at_once() -> None:
             await asyncio.wait([task])
 
 
-async def test_a_connection_that_confirms_it_does_not_lose_anything(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_confirmed_connection_is_lossless(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here the other end's buffer is full; an adapter that lost its Wi-Fi is as silent."""
     monkeypatch.setattr("service.links.fc_device._TCP_STALL_MS", 100)
     loop = asyncio.get_running_loop()

@@ -87,7 +87,7 @@ async def test_timestamps_continue_after_a_restart_without_a_clock(tmp_path: Pat
     state.close()
 
 
-async def test_no_timestamp_repeats_after_a_power_cut(tmp_path: Path) -> None:
+async def test_timestamps_do_not_repeat_after_a_power_cut(tmp_path: Path) -> None:
     pi = Pi(tmp_path)
     pi.boot()
     await until_written(pi, ticks(NOON) + AHEAD)

@@ -134,7 +134,7 @@ def test_the_loop_runs_new_callbacks_at_once(loop: EventLoop, how: str) -> None:
     loop.run_forever()
 
 
-async def test_descriptors_and_timers_are_served_beside_a_busy_lane() -> None:
+async def test_descriptors_and_timers_are_served_despite_a_busy_lane() -> None:
     loop = running()
     near, far = socket.socketpair()
     served: list[str] = []
@@ -156,7 +156,7 @@ async def test_descriptors_and_timers_are_served_beside_a_busy_lane() -> None:
     far.close()
 
 
-async def test_the_lane_is_served_beside_a_busy_loop(port: Port) -> None:
+async def test_the_lane_is_served_despite_a_busy_loop(port: Port) -> None:
     called: list[float] = []
     port.loop.lane.set_timer(port.loop.time() + INTERVAL_S, called.append)
     port.write(b"data")

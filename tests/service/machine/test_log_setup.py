@@ -57,7 +57,7 @@ def test_the_journal_gets_each_line_with_the_priority(monkeypatch: pytest.Monkey
     )
 
 
-def test_a_terminal_does_not_get_escape_sequences_of_others() -> None:
+def test_foreign_escape_sequences_do_not_reach_the_terminal() -> None:
     ours, terminal = os.openpty()
     script = BEGIN + 'log.info("fc.lost", why="a\\x1b[2Jb")'
     subprocess.run([sys.executable, "-c", script], cwd=REPOSITORY, stderr=terminal, timeout=TIMEOUT_S, check=True)

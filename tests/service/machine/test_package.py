@@ -14,7 +14,7 @@ def test_the_version_is_that_of_the_metadata(package: str) -> None:
     assert version(package) == metadata.version(package)
 
 
-def test_a_package_that_is_not_installed_does_not_have_a_version() -> None:
+def test_a_package_that_is_not_installed_has_an_unknown_version() -> None:
     assert version("no-such-package") == "unknown"
 
 

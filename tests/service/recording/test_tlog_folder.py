@@ -41,7 +41,7 @@ def test_files_are_named_after_their_first_record_in_utc(tmp_path: Path) -> None
     assert (tmp_path / "state" / "logs" / "2026-11-21 12-00-00.tlog").read_bytes() == 3 * record()
 
 
-def test_a_clock_that_was_set_back_does_not_overwrite_anything(tmp_path: Path) -> None:
+def test_setting_the_clock_back_does_not_overwrite_files(tmp_path: Path) -> None:
     folder = TlogFolder(tmp_path, MOST)
     for count in (1, 2, 3):
         fill(folder, NOON, count)

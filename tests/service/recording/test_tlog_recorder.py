@@ -78,7 +78,7 @@ def test_the_first_heartbeat_in_a_file_is_the_vehicles(tmp_path: Path, version: 
     assert heartbeats == [vehicle, station]
 
 
-def test_a_small_correction_of_the_clock_does_not_change_anything(tmp_path: Path) -> None:
+def test_a_small_clock_correction_is_ignored(tmp_path: Path) -> None:
     corrections = count(step=10**8)
     recorder = TlogRecorder(tmp_path, 256 << 20, lambda: time.time_ns() + next(corrections))
     deadline = time.monotonic() + TIMEOUT_S

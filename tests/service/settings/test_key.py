@@ -41,7 +41,7 @@ def test_a_number_is_accepted_from_the_least_to_the_most(value: int) -> None:
             whole(1, 9).read(value, HERE)
 
 
-def test_true_is_not_a_number_and_one_is_not_true() -> None:
+def test_true_is_not_a_number_and_1_is_not_true() -> None:
     with pytest.raises(Unfit, match="whole number"):
         whole(0, 1).read(True, HERE)
     with pytest.raises(Unfit, match="true or false"):

@@ -83,7 +83,7 @@ def test_only_listed_addresses_may_write(tmp_path: Path, host: str, may: bool) -
     assert found[LINK].has_address(Peer(LINK, (host, 14550))) is may
 
 
-def test_with_an_empty_list_no_address_may_write(tmp_path: Path) -> None:
+def test_an_empty_list_of_writers_refuses_every_address(tmp_path: Path) -> None:
     found = access(tmp_path, f'{{address = "{LINK}", writers = []}}')
     assert not found[LINK].has_address(Peer(LINK, ("127.0.0.1", 1)))
 

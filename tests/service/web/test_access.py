@@ -59,7 +59,7 @@ def test_restoring_needs_the_token(shared_web: WebBench, name: str) -> None:
     assert token not in shared_web.daemon.printed
 
 
-def test_opening_a_url_does_not_restore_anything(shared_web: WebBench) -> None:
+def test_opening_a_url_cannot_restore_a_mission(shared_web: WebBench) -> None:
     answer = shared_web.ask(RESTORE, Authorization=f"Bearer {shared_web.token}")
     assert (answer.status, answer.headers["Allow"]) == (405, "POST")
     assert shared_web.ask(RESTORE, "OPTIONS", Origin="http://evil.example").status == 405
@@ -249,7 +249,7 @@ def test_only_the_listed_web_applications_may_use_the_interface(start: Starter) 
         assert web.ask("/api/state", Origin=origin).headers["access-control-allow-origin"] == allowed
 
 
-def test_without_such_a_list_no_other_origin_may(shared_web: WebBench) -> None:
+def test_other_origins_are_refused_by_default(shared_web: WebBench) -> None:
     answer = shared_web.ask("/api/state", Origin="https://fleet.example.org")
     assert "access-control-allow-origin" not in answer.headers
     assert shared_web.ask("/api/pi", "OPTIONS", Origin="https://fleet.example.org").status == 405

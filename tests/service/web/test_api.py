@@ -65,7 +65,7 @@ def test_an_earlier_mission_is_restored(web: WebBench) -> None:
     assert (newest["number"], newest["source"], newest["outcome"]) == (3, "restore of mission 1", "VERIFIED")
 
 
-def test_does_not_restore_anything_while_armed(web: WebBench) -> None:
+def test_refuses_a_restore_while_armed(web: WebBench) -> None:
     assert web.board is not None
     web.daemon.push(plain_plan(9))
     web.push_example()
@@ -77,7 +77,7 @@ def test_does_not_restore_anything_while_armed(web: WebBench) -> None:
     assert web.board.records() == held
 
 
-def test_does_not_restore_anything_while_armed_in_mavlink_mode(start: Starter) -> None:
+def test_refuses_a_restore_while_armed_in_mavlink_mode(start: Starter) -> None:
     board = start.board("--tele-prot", "2")
     web = web_daemon(start, str(board.link))
     web.daemon.push(plain_plan(9))

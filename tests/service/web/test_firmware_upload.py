@@ -36,7 +36,7 @@ def test_a_wrong_image_is_refused(shared_web: WebBench, name: str, body: bytes, 
     assert why in answer.data["error"]
 
 
-def test_without_the_token_it_does_not_flash_anything(shared_web: WebBench) -> None:
+def test_flashing_needs_the_token(shared_web: WebBench) -> None:
     assert post(shared_web, "/api/firmware?name=x.bin", PATCHED, Authorization="Bearer 2222222222222222").status == 401
     assert shared_web.board is not None
     assert not shared_web.board.stats()["bootloader_entered"]

@@ -103,7 +103,7 @@ def test_invalid_requests_are_refused(web: WebBench, body: bytes) -> None:
     assert post(web, "/api/pi", body).status == 422
 
 
-def test_does_not_change_anything_while_the_craft_is_armed(web: WebBench) -> None:
+def test_refuses_changes_while_the_craft_is_armed(web: WebBench) -> None:
     assert web.board is not None
     web.board.set("armed 1")
     until(lambda: web.state()["last_heard"]["armed"], "the armed craft")
@@ -118,7 +118,7 @@ def test_does_not_change_anything_while_the_craft_is_armed(web: WebBench) -> Non
         until(lambda: web.state()["last_heard"]["armed"] is False, "the disarmed craft")
 
 
-def test_does_not_change_anything_while_firmware_is_flashed(tmp_path: Path) -> None:
+def test_refuses_changes_while_firmware_is_flashed(tmp_path: Path) -> None:
     report = SimpleNamespace(last_heard=SimpleNamespace(armed=False))
     daemon: Any = SimpleNamespace(report=lambda: report, fc=SimpleNamespace(is_lent=True))
     token = Token(tmp_path / "token")

@@ -35,7 +35,7 @@ def post(bench: WebBench, path: str, body: bytes, **headers: str) -> Answer:
         connection.close()
 
 
-def test_a_check_does_not_change_anything(web: WebBench) -> None:
+def test_a_check_is_read_only(web: WebBench) -> None:
     assert web.board is not None
     web.daemon.push(plain_plan(9))
     held, missions = web.board.records(), web.daemon.missions()

@@ -42,7 +42,7 @@ def page(laptop: Browser) -> Iterator[Browser]:
     assert laptop.errors() == []
 
 
-def test_the_first_paint_is_small_and_does_not_load_anything_from_elsewhere(page: Browser) -> None:
+def test_the_first_paint_is_small_and_self_contained(page: Browser) -> None:
     addresses, size = page.traffic()
     assert addresses
     assert {address for address in addresses if not address.startswith(page.url)} == set()
@@ -88,7 +88,7 @@ def test_the_map_shows_track_waypoints_roi_home_and_craft(page: Browser) -> None
     assert page.run(inside)
 
 
-def test_the_scale_is_true(page: Browser) -> None:
+def test_the_scale_is_right(page: Browser) -> None:
     """Home and waypoint 2 are 37.1 m apart on the map."""
     bar = page.run("return document.querySelector('#map .scale').getBBox().width")
     metres = float(page.text("#map .scale + text").removesuffix(" m"))
@@ -159,7 +159,7 @@ def test_the_page_fits_a_phone(browsers: Browsers, bench: WebBench) -> None:
         assert phone.run(f"return [...document.querySelectorAll('{fields}')].filter({small}).length") == 0
 
 
-def test_a_page_without_a_mission_and_a_position_says_so(browsers: Browsers, tmp_path: Path) -> None:
+def test_a_page_without_mission_and_position_explains_it(browsers: Browsers, tmp_path: Path) -> None:
     with web_bench(tmp_path) as bench, browsers.tab(bench.port) as page:
         page.open("mission")
         page.unfold("#missions-block")

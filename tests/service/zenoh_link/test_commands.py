@@ -62,7 +62,7 @@ def test_by_default_a_caller_gets_only_the_result(commanded: tuple[Bench, zenoh.
     assert answer["result"]["text"].startswith("40 of 40 stored: ")
 
 
-def test_a_check_does_not_change_anything(commanded: tuple[Bench, zenoh.Session]) -> None:
+def test_a_check_is_read_only(commanded: tuple[Bench, zenoh.Session]) -> None:
     bench, opened = commanded
     before, missions = bench.board.records(), len(bench.daemon.missions())
     (answer,) = ask(opened, CHECK, mission_file(12, start=7))
@@ -157,7 +157,7 @@ def test_only_one_transfer_runs_at_a_time(commanded: tuple[Bench, zenoh.Session]
     assert f"{verified[0]['checksum']}" == bench.daemon.pull()["checksum"]
 
 
-def test_does_not_write_anything_while_armed(start: Starter) -> None:
+def test_refuses_writes_while_armed(start: Starter) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')
     with session(connect=where) as opened:

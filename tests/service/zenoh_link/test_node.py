@@ -117,7 +117,7 @@ def test_an_upload_succeeds_although_the_router_hangs(start: Starter, tmp_path: 
         assert bench.daemon.end() == 0
 
 
-def test_a_stalled_subscriber_does_not_delay_anything(start: Starter) -> None:
+def test_a_stalled_subscriber_does_not_delay_others(start: Starter) -> None:
     """Missions, other subscribers and the daemon's shutdown are unaffected."""
     where = endpoint()
     bench = zenoh_bench(start, f'listen = ["{where}"]\n{I_KNOW}')

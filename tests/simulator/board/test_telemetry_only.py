@@ -22,7 +22,7 @@ def test_replies_have_the_firmwares_lengths(kind: str) -> None:
 
 
 @pytest.mark.parametrize("command", [106, 107])
-def test_a_betaflight_without_gps_does_not_have_gps_messages(command: int) -> None:
+def test_a_betaflight_without_gps_lacks_gps_messages(command: int) -> None:
     frame = MspBench("betaflight").ask(command)
     assert frame is not None
     assert frame.direction == "!"

@@ -209,7 +209,7 @@ def test_wpflush_counts_after_save() -> None:
     assert bench.pull() == []
 
 
-def test_exit_restarts_the_board_and_does_not_save_anything() -> None:
+def test_exit_restarts_the_board_without_saving() -> None:
     bench = in_cli(5)
     typed(bench, b"wpflush")
     typed(bench, b"exit", 2.0)

@@ -22,7 +22,7 @@ def erase(steps: Steps) -> Steps:
     return steps.store(CR, PER).store(AR, PLACE).store(CR, PER | STRT).store(CR, 0)
 
 
-def test_does_not_write_anything_without_the_keys() -> None:
+def test_flash_writes_need_the_keys() -> None:
     steps = Steps().load(CR).store(KEYR, 0x4567_0123).store(KEYR, 1).store(CR, PG).store_half(PLACE, 0x1234).load(CR)
     rig = Rig(steps.load(PLACE).load(SR)).run(0.01)
     assert rig.log(4) == [LOCK, LOCK, 0xFFFF_FFFF, PROGRAM_ERROR]

@@ -98,7 +98,7 @@ def test_the_barometer_converts_on_command() -> None:
     assert abs(pressure - 9_085_466) <= 100
 
 
-def test_no_device_answers_at_another_address() -> None:
+def test_other_addresses_are_not_answered() -> None:
     steps = bus().store(CR1, PE | START).wait(SR1, SB).store(DR, 0x50 << 1).wait(SR1, AF).store(SR1, 0)
     rig = Rig(steps.store(CR1, PE | STOP).load(SR1).load(SR2)).run(0.01)
     assert rig.log(1) == [0]

@@ -234,7 +234,7 @@ def test_an_invalid_jump_blocks_arming(jump: dict[str, int], arms: bool) -> None
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_while_armed_version_7_does_not_store_anything_and_8_everything(version: str) -> None:
+def test_while_armed_version_7_ignores_writes_and_8_stores_them(version: str) -> None:
     bench = MspBench("inav", MspOptions(version=version))
     bench.upload(THREE)
     bench.faults.armed = True
@@ -243,7 +243,7 @@ def test_while_armed_version_7_does_not_store_anything_and_8_everything(version:
     assert bench.info() == ((120, True, 3) if version[0] < "8" else (120, False, 1))
 
 
-def test_version_9_does_not_store_anything_while_it_flies_a_mission() -> None:
+def test_version_9_ignores_writes_during_a_mission() -> None:
     bench = MspBench("inav", faults=Faults(armed=True, boxes=0))
     bench.upload([waypoint(100), waypoint(200)])
     bench.faults.boxes = 1 << NAV_WP_BIT

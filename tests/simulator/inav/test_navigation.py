@@ -246,7 +246,7 @@ def test_a_landing_goes_on_under_the_new_number() -> None:
     assert flight.status() == (NAV, 9, 1, 1, 11)
 
 
-def test_older_versions_do_not_know_the_request() -> None:
+def test_older_versions_lack_the_request() -> None:
     flight = Flight(waypoint(20), waypoint(40), version="9.0.1")
     flight.until(lambda status: status[:2] == (NAV, 5))
     assert not sets_index(flight.bench, 1)

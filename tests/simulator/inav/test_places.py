@@ -41,7 +41,7 @@ def test_the_error_to_a_circle_without_a_radius_has_the_centre() -> None:
     assert (frame.direction, frame.payload) == (Direction.ERROR, struct.pack("<BBii", 3, 1, 5000, 0))
 
 
-def test_setting_waypoints_erases_approaches() -> None:
+def test_writing_waypoints_erases_approaches() -> None:
     """After each mission of three waypoints since the boot, as 7.1.0, 8.0.1, 9.0.1 and 9.1.0 do."""
     bench = MspBench("inav")
     for number in range(APPROACHES):

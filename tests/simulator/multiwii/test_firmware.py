@@ -138,7 +138,7 @@ def test_an_empty_setter_takes_the_bytes_that_an_earlier_request_left() -> None:
     assert bench.payload(PID)[:30] == bytes(range(100, 130))
 
 
-def test_in_a_mission_writes_do_not_get_a_reply_and_reads_are_empty() -> None:
+def test_during_a_mission_writes_are_unanswered_and_reads_empty() -> None:
     bench = flying()
     assert status(bench)[:2] == (3, 5)
     assert bench.ask(SET_WP, waypoint(9).pack(1)) is None

@@ -155,7 +155,7 @@ def test_the_main_loop_answers_at_most_every_looptime() -> None:
     assert 0.04 < bench.now - before < 0.06
 
 
-def test_a_hung_board_does_not_answer_anything_until_released() -> None:
+def test_a_hung_board_is_silent_until_released() -> None:
     bench = Bench()
     bench.naze.faults.hang = True
     assert bench.ask(IDENT, timeout=3.0) is None
@@ -183,7 +183,7 @@ def test_too_many_requests_at_once_corrupt_the_replies() -> None:
     assert bench.received.count(b"ANGLE;HORIZON;BARO;") < 4
 
 
-def test_without_power_it_does_not_receive_or_answer_anything() -> None:
+def test_an_unpowered_board_is_deaf_and_silent() -> None:
     bench = Bench()
     bench.naze.power_off(bench.now)
     assert bench.ask(IDENT, timeout=5.0) is None
@@ -252,7 +252,7 @@ def test_lost_bytes_and_flipped_bits_follow_the_seed() -> None:
         max_size=25,
     )
 )
-def test_late_reading_does_not_change_anything(schedule: list[tuple[bytes, float]]) -> None:
+def test_reading_late_gives_the_same_bytes(schedule: list[tuple[bytes, float]]) -> None:
     """Read at each wake-up or once at the end, the bytes are the same."""
     punctual, late = Bench(), Bench()
     for data, pause in schedule:

@@ -33,7 +33,7 @@ def test_a_set_survives_a_power_cut_half_a_second_later() -> None:
     assert dict(page.listed(bench).values())["p_roll"] == 44
 
 
-def test_while_it_lists_no_msp_is_answered() -> None:
+def test_msp_is_not_answered_during_a_listing() -> None:
     bench = Bench()
     MavlinkGround(bench).send(m.MAVLink_param_request_list_message(1, 200))
     bench.run(15)

@@ -66,7 +66,7 @@ def test_sent_bytes_leave_at_line_rate() -> None:
 
 
 @given(st.lists(st.tuples(st.binary(min_size=1, max_size=100), st.floats(0.0005, 0.03)), max_size=30))
-def test_does_not_lose_anything_unless_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
+def test_loses_bytes_only_if_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
     uart, counters = make()
     sent, now, outstanding = b"", 0.0, 0.0
     received = b""
@@ -137,7 +137,7 @@ def test_half_the_speed_doubles_each_bit() -> None:
     assert garble(b"U", 9600, 19200)[0] == 0x66
 
 
-def test_a_disconnected_port_does_not_carry_anything() -> None:
+def test_a_disconnected_port_is_silent() -> None:
     assert garble(b"hello", 0, 115200) == b""
 
 

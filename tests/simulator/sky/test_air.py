@@ -15,7 +15,7 @@ from simulator.sky.wind import Wind
 
 
 @given(speed=st.floats(0.5, 15), seed=st.integers(0, 100))
-def test_wind_blows_from_where_it_is_said_to_come(speed: float, seed: int) -> None:
+def test_wind_blows_from_the_given_direction(speed: float, seed: int) -> None:
     north, west, up = Wind(speed, 270.0, seed, gusts=False).at(0.0)
     assert (north, west, up) == pytest.approx((0.0, -speed, 0.0), abs=1e-9)
 
@@ -29,7 +29,7 @@ def test_gusts_average_to_zero() -> None:
     assert sqrt(sum((v - mean) ** 2 for v in north) / len(north)) == pytest.approx(1.0, abs=0.15)
 
 
-def test_calm_is_calm() -> None:
+def test_calm_air_is_still() -> None:
     assert {Wind().at(0.1 * step) for step in range(100)} == {(0.0, 0.0, 0.0)}
 
 

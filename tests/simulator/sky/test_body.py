@@ -39,7 +39,7 @@ def run(body: Body, seconds: float, pulses: tuple[int, ...] = OFF) -> Body:
 
 
 @given(heading=st.floats(0, 360), seconds=st.floats(0.01, 0.5))
-def test_at_rest_it_stays_at_rest(heading: float, seconds: float) -> None:
+def test_a_craft_at_rest_stays_at_rest(heading: float, seconds: float) -> None:
     body = run(Body(heading_deg=heading), seconds)
     assert body.position == ZERO
     assert body.velocity == ZERO

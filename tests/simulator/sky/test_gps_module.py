@@ -60,7 +60,7 @@ def test_it_speaks_nmea_until_it_is_configured() -> None:
     assert {kind for kind, _ in frames(run(gps, 1.0, begin=1.0))} == {0x02, 0x03, 0x06, 0x12}
 
 
-def test_it_obeys_a_change_of_speed_and_then_does_not_know_another() -> None:
+def test_it_obeys_only_the_first_change_of_speed() -> None:
     gps = GpsModule(Place())
     gps.hear(TO_115200, 9600)
     gps.advance(0.0, ZERO, ZERO)
@@ -73,7 +73,7 @@ def test_it_obeys_a_change_of_speed_and_then_does_not_know_another() -> None:
 
 
 @given(chunks=st.lists(st.binary(max_size=40), max_size=20))
-def test_any_bytes_do_it_no_harm(chunks: list[bytes]) -> None:
+def test_arbitrary_bytes_are_harmless(chunks: list[bytes]) -> None:
     gps = GpsModule(Place())
     for chunk in chunks:
         gps.hear(chunk, BAUD)
@@ -91,7 +91,7 @@ def test_five_fixes_a_second_each_a_fifth_of_a_second_old() -> None:
     assert gps.take(20.21, BAUD) != b""
 
 
-def test_position_and_speed_in_the_units() -> None:
+def test_position_and_speed_have_the_protocols_units() -> None:
     place = Place()
     sent = frames(run(ubx(), 1.0, (100.0, 50.0, 20.0), (3.0, -4.0, 1.0)))
     position = next(payload for kind, payload in sent if kind == 0x02)

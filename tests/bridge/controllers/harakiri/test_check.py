@@ -275,7 +275,7 @@ def test_the_mission_frame_with_a_position_rejects_the_list(command: int) -> Non
 
 @pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
 @pytest.mark.parametrize("faulty", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0), item(TIME, alt_m=NAN)])
-def test_the_frame_of_a_dropped_item_does_not_reject_anything(faulty: MissionItem, frame: int) -> None:
+def test_the_frame_of_a_dropped_item_does_not_reject_the_list(faulty: MissionItem, frame: int) -> None:
     verdict = verdict_on(replace(faulty, frame=frame), item(WAYPOINT))
     assert verdict.result is Result.ACCEPTED
     assert len(verdict.items) == 2
@@ -337,7 +337,7 @@ def test_a_take_off_after_dropped_items_names_the_items_to_remove() -> None:
     assert verdict.findings[-1].text() == f"Rejected, WP 2: {why}"
 
 
-def test_a_list_without_home_says_so() -> None:
+def test_a_list_without_home_is_reported() -> None:
     verdict = check_list([item(TAKEOFF), item(WAYPOINT)], PROFILE)
     why = "put home first, item 0 is TAKEOFF"
     assert verdict.findings[-1].text() == f"Rejected, Home: {why}"

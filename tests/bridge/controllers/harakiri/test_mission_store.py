@@ -268,7 +268,7 @@ def test_arming_during_a_push_keeps_the_old_list() -> None:
     assert reported[PushFailure.ARMED.value.text] > 6
 
 
-def test_a_brief_arming_during_a_push_damages_no_list() -> None:
+def test_a_brief_arming_during_a_push_keeps_the_list_intact() -> None:
     reported = outcomes(switching("armed", 0.4, 0.1), 15)
     assert set(reported) <= {"ACCEPTED", PushFailure.ARMED.value.text, ARMED.text}
 

@@ -51,7 +51,7 @@ def test_rates_are_unknown_and_north_needs_a_compass() -> None:
     assert (before.is_north_known, after.is_north_known) == (False, True)
 
 
-def test_a_harakiri_that_never_reported_a_signal_does_not_have_a_receiver_for_it() -> None:
+def test_signal_strength_0_is_unknown_until_a_first_signal() -> None:
     """It sends 0 without such a receiver. After the first other value, 0 is a lost signal."""
     vehicle, strengths, sender = Vehicle(), [], m.MAVLink(None, srcSystem=1, srcComponent=1)
     telemetry = MavlinkTelemetry(HarakiriReadings(vehicle))

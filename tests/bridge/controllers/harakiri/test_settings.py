@@ -23,7 +23,7 @@ def test_the_list_takes_less_than_two_seconds_and_is_then_cached() -> None:
     world.assert_line_was_clean()
 
 
-def test_a_change_that_touches_others_is_read_back_whole() -> None:
+def test_a_change_with_side_effects_is_read_back_completely() -> None:
     """Another accelerometer makes the calibration of the first one void."""
     world, client = ready(BOARDS["patched Harakiri"])
     assert value_of(client.change("rc_trm_rll", 12.5)) == 12.5
@@ -34,7 +34,7 @@ def test_a_change_that_touches_others_is_read_back_whole() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_bad_line_gives_the_true_table_or_no_table(seed: int) -> None:
+def test_a_bad_line_yields_the_right_table_or_none(seed: int) -> None:
     world = World(faults=Faults(bit_error_rate=1e-4), speeds=(115200,), seed=seed)
     table = SettingsClient(world).wait_read(120)
     held = [

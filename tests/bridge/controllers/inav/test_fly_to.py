@@ -114,7 +114,7 @@ def changed(**values: int) -> Callable[[], Inav]:
         (changed(error=FINISHED, action=NavAction.LAND), "landing"),
     ],
 )
-def test_does_not_send_anything_unless_the_mission_is_in_flight(make: Callable[[], Inav], text: str) -> None:
+def test_refuses_unless_the_mission_is_in_flight(make: Callable[[], Inav], text: str) -> None:
     inav = make()
     refusal = run(inav)
     assert refusal is not None
@@ -123,7 +123,7 @@ def test_does_not_send_anything_unless_the_mission_is_in_flight(make: Callable[[
 
 
 @pytest.mark.parametrize("held", [None, replace(RECORD, alt_cm=2001)])
-def test_does_not_send_anything_if_the_board_has_another_record_there(held: NavRecord | None) -> None:
+def test_refuses_if_the_board_holds_another_record(held: NavRecord | None) -> None:
     inav = Inav()
     refusal = run(inav, held=held)
     assert refusal is not None
@@ -131,7 +131,7 @@ def test_does_not_send_anything_if_the_board_has_another_record_there(held: NavR
     assert inav.set_to == []
 
 
-def test_a_new_version_may_refuse_it_for_reasons_of_its_own() -> None:
+def test_a_new_version_may_refuse_for_other_reasons() -> None:
     inav = Inav()
     inav.direction = Direction.ERROR
     refusal = run(inav)

@@ -74,7 +74,7 @@ def test_differences_on_a_rover_or_boat_are_named(platform: Platform) -> None:
     ]
 
 
-def test_a_far_or_high_flight_is_named_although_inav_does_not_have_a_limit() -> None:
+def test_a_far_or_high_flight_is_reported_on_inav_without_limits() -> None:
     far = replace(WP, lat_e7=LAT + 60 * NORTH, alt_m=200.0)
     assert texts(NEAR, far, RTL_LANDS) == [
         "WP 2: 5.9 km leg, over 2 km (+1)",
@@ -294,6 +294,6 @@ def test_settings_are_read_from_a_dump_and_from_a_param_file() -> None:
     assert saved_limits(params) == expected
 
 
-def test_a_value_that_no_inav_has_is_refused() -> None:
+def test_a_value_unknown_to_inav_is_refused() -> None:
     with pytest.raises(ValueError, match="nav_rth_alt_mode cannot be SOMETIMES"):
         saved_limits(read_settings_file(b"set nav_rth_alt_mode = SOMETIMES\n", "dump.txt"))

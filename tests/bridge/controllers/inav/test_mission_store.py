@@ -104,7 +104,7 @@ def test_a_multiwii_holds_the_items_it_supports() -> None:
 
 
 @pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_does_not_change_anything_while_armed(version: str) -> None:
+def test_refuses_changes_while_armed(version: str) -> None:
     board, world, station = board_with(version=version)
     assert Upload(station, plan(10)).run() is ACCEPTED
     before = board.stored_records
@@ -135,7 +135,7 @@ def test_arming_at_any_moment_does_not_fly_a_half_list(moment: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_damaged_bytes_set_off_no_hazard(seed: int) -> None:
+def test_damaged_bytes_are_free_of_hazards(seed: int) -> None:
     faults = Faults(boxes=0)
     board, world, station = board_with(faults=faults, version="7.1.2", seed=seed)
     faults.lost_byte_rate = faults.bit_error_rate = 5e-4

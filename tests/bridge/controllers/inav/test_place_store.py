@@ -236,7 +236,7 @@ def test_unchanged_safehomes_keep_their_number_and_so_their_landing_approach() -
     assert [answer[1] for answer in stored if answer] == [0, 1, 1]
 
 
-def test_a_new_world_does_not_have_a_fence() -> None:
+def test_a_board_without_missions_refuses_rally_points() -> None:
     """Before a board is found, and on one without missions."""
     station = GroundStation(World(peer=make_board("betaflight", faults=Faults(boxes=0)), speeds=(115200,)))
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is MissionResult.UNSUPPORTED

@@ -105,7 +105,7 @@ def test_zones_are_judged_on_the_way_as_flown() -> None:
     assert texts(concave, legs=(at(0, -0.5), at(-0.5, 2))) == []
 
 
-def test_only_the_first_stop_is_said() -> None:
+def test_only_the_first_stop_is_reported() -> None:
     assert texts(circle(2), legs=(at(1), at(3), at(1), at(3))) == ["WP 1: " + STOPS.format("geozone 0")]
 
 
@@ -122,7 +122,7 @@ def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
 
 
-def test_without_an_action_a_zone_does_not_stop_anything() -> None:
+def test_a_zone_without_an_action_does_not_stop_a_mission() -> None:
     assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: flown, no action is set"]
     assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 1: returns at geozone 0 if ANGLE is on"]
 
@@ -142,7 +142,7 @@ def test_the_nearest_border_with_an_action_is_named_where_a_mission_stops() -> N
         (FenceAction.NONE, ""),
     ],
 )
-def test_a_stop_at_a_zone_is_said_once(action: FenceAction, said: str) -> None:
+def test_a_stop_at_a_zone_is_reported_once(action: FenceAction, said: str) -> None:
     """300 m to the north, with the switch of ANGLE on."""
     board, world, station = board_with(version="9.1.0")
     zone = circle(3, radius_m=30, action=action)

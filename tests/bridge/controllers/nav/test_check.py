@@ -144,7 +144,7 @@ def test_home_is_not_a_record() -> None:
 # -- flown differently than it reads ---------------------------------------------------------------------------
 
 
-def test_an_rtl_as_first_item_does_not_leave_anything_to_fly() -> None:
+def test_an_rtl_as_the_first_item_is_rejected() -> None:
     assert verdict_on(RTL, WP, WP).ack is MissionResult.INVALID
 
 
@@ -320,7 +320,7 @@ def test_any_record_of_another_planner_is_shown() -> None:
         (NavRecord(A.WAYPOINT, LAT, LON, 3000, p3=1), ""),
     ],
 )
-def test_values_that_no_item_shows_are_lost_with_a_warning(record: NavRecord, lost: str) -> None:
+def test_values_that_items_cannot_show_are_lost_with_a_warning(record: NavRecord, lost: str) -> None:
     held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
     items = list(items_from_records(held, home_item((LAT, LON))))
     verdict = check_list(items, NavRules(NavProfile(), held))

@@ -156,7 +156,7 @@ def test_one_lost_frame_costs_less_than_two_seconds(loss: str) -> None:
         assert outcome[0][0].ack is ACCEPTED
 
 
-def test_does_not_send_anything_while_armed() -> None:
+def test_refuses_uploads_and_clears_while_armed() -> None:
     inav = FakeInav()
     world, station = found(inav)
     inav.armed = True

@@ -253,7 +253,7 @@ def test_another_clients_change_to_a_mission_that_is_not_loaded_is_kept(selected
     assert bench.stored() == [packed(plan(21, 7)), changed]
 
 
-def test_while_the_other_missions_cannot_be_read_it_does_not_write_anything() -> None:
+def test_a_write_is_refused_if_the_other_missions_are_unreadable() -> None:
     """Another client writes a list just before the push, and reading it fails."""
     bench = Bench(4, 6)
     receive, frames = bench.board.receive, MspParser()

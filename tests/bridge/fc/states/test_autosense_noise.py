@@ -52,7 +52,7 @@ def listen(noise: bytes, search: Searching, chunk: int) -> set[int | None]:
 
 
 @pytest.mark.parametrize("name", ALPHABETS)
-def test_megabytes_of_noise_give_no_verdict(name: str) -> None:
+def test_megabytes_of_noise_are_inconclusive(name: str) -> None:
     draw = random.Random(name)
     noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
     visited = listen(noise, begin(*SPEEDS), 96)
@@ -68,7 +68,7 @@ def test_noise_full_of_frame_headers_does_not_give_a_verdict(preamble: bytes) ->
     listen(noise, begin(*SPEEDS), 200)
 
 
-def test_damaged_mavlink_and_foreign_msp_requests_give_no_verdict() -> None:
+def test_damaged_mavlink_and_foreign_msp_requests_are_inconclusive() -> None:
     """Each MAVLink frame has one damaged byte; the requests are intact, from another companion on the same wire."""
     draw = random.Random(1)
     mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)

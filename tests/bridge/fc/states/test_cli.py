@@ -144,7 +144,7 @@ def test_a_board_in_the_cli_is_probed_every_three_seconds(kind: str) -> None:
     assert_nothing_was_typed(world, 0)
 
 
-def test_does_not_send_anything_while_a_person_types() -> None:
+def test_is_silent_while_a_person_types() -> None:
     world = left_in_cli(BOARDS["testcode3"]())
     world.wait_until(is_in_cli, 2)
     world.run(1)

@@ -19,7 +19,7 @@ def heartbeat(sender: tuple[int, int], version: int, autopilot: int = 3) -> byte
 
 
 @pytest.mark.parametrize("kind", [3, 8], ids=["autopilot", "sensor"])
-def test_a_second_component_beside_an_autopilot_does_not_change_anything(kind: int) -> None:
+def test_a_second_component_of_an_autopilot_is_ignored(kind: int) -> None:
     """Component 200 is also MAVLink's id of a gyro. The autopilot's own heartbeats come less often."""
     world = World(peer=Autopilot(), speeds=(115200,))
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 5)

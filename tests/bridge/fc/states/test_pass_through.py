@@ -187,7 +187,7 @@ def test_ground_stations_reach_each_other() -> None:
     assert bytes(autopilot.received) == b""
 
 
-def test_a_silent_station_does_not_get_more_frames() -> None:
+def test_a_silent_station_stops_getting_frames() -> None:
     world, _autopilot, (one, other) = passing()
 
     def send() -> None:
@@ -287,7 +287,7 @@ def test_addresses_heard_once_do_not_multiply_frames() -> None:
     assert len(ground.peers()) == 2
 
 
-def test_an_address_that_is_used_again_does_not_get_anything_for_the_earlier_ids() -> None:
+def test_a_reused_address_does_not_get_frames_for_earlier_ids() -> None:
     world, autopilot, (one, _) = passing()
     world.bridge.gcs_gone(one.peer, world.now)
     successor = GroundStation(world, "gcs0", sysid=7)

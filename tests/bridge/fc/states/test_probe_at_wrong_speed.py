@@ -40,7 +40,7 @@ def test_probes_are_clean_at_their_own_speed() -> None:
 
 
 @pytest.mark.parametrize("read", READ)
-def test_no_run_within_a_probe(read: int) -> None:
+def test_probes_are_free_of_runs(read: int) -> None:
     for sent, clock in itertools.product(SENT, CLOCKS):
         assert runs(as_read(PROBE, sent, read, clock)) == 0
         assert runs(as_read(RESYNC, sent, read, clock)) == 0
@@ -50,7 +50,7 @@ def test_no_run_within_a_probe(read: int) -> None:
 
 
 @pytest.mark.parametrize("read", READ)
-def test_no_run_across_probes(read: int) -> None:
+def test_probes_do_not_form_a_run_across_frames(read: int) -> None:
     """A run across probes needs one that ends with a hazard byte and one that begins with it. There are none."""
     for clock in CLOCKS:
         words = {as_read(frame, sent, read, clock) for sent in SENT for frame in (PROBE, RESYNC)} - {b""}
@@ -62,7 +62,7 @@ def test_no_run_across_probes(read: int) -> None:
 
 
 @pytest.mark.parametrize("sent", SENT)
-def test_no_run_for_a_receiver_that_starts_within_a_probe(sent: int) -> None:
+def test_a_receiver_that_starts_within_a_probe_sees_no_run(sent: int) -> None:
     """A receiver that is switched on, or sees its first falling edge, in the middle of a probe."""
     for read in (sent // 12, sent // 6, sent // 4, sent // 3, sent // 2, 2 * sent):
         for clock in CLOCKS:
@@ -71,7 +71,7 @@ def test_no_run_for_a_receiver_that_starts_within_a_probe(sent: int) -> None:
 
 
 @pytest.mark.parametrize("read", [300, 14400, 31250, 250000])
-def test_a_minute_of_searching_triggers_no_hazard(read: int) -> None:
+def test_a_minute_of_searching_is_free_of_hazards(read: int) -> None:
     """Ten rounds of the search, received by a board at an unlisted speed."""
     world = World(SimOptions(baud=read))
     world.run(60)

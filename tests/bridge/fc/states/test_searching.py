@@ -172,7 +172,7 @@ def test_a_radio_with_a_ground_station_behind_it_is_not_a_flight_controller() ->
 
 
 @pytest.mark.parametrize("peer", [QuietLine, Loopback])
-def test_an_empty_line_yields_no_flight_controller(peer: Callable[[], QuietLine]) -> None:
+def test_an_empty_line_does_not_yield_a_flight_controller(peer: Callable[[], QuietLine]) -> None:
     world = World(peer=peer())
     world.run(60)
     assert isinstance(world.inside.session.state, Searching)

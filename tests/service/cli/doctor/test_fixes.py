@@ -113,7 +113,7 @@ def test_programs_are_not_ended_and_the_pi_not_restarted_from_the_page(
 
 
 @pytest.mark.parametrize("where", ["/etc/shadow", "/dev/../etc/shadow", 5, None, "\n", "\ud800", "x" * 100_000, [], {}])
-def test_a_daemon_that_lies_about_the_port_does_not_get_a_remedy_for_a_file(pi: FixablePi, where: object) -> None:
+def test_a_lying_daemon_cannot_get_a_remedy_for_a_file(pi: FixablePi, where: object) -> None:
     pi.write("/etc/shadow", "root::").chmod(0o600)
     pi.status = {**STATUS, "where": where, "speed_baud": [], "armed": {}, "refused": [7], "found_s": 10**400}
     offered = {found["fix"] for found in pi.ask("doctor")["checks"]}

@@ -40,7 +40,7 @@ def test_a_damaged_store_is_a_problem(tmp_path: Path) -> None:
     assert_note(aside, "corrupt-20261121-120000")
 
 
-def test_a_store_of_a_service_that_was_taken_over_does_no_harm(tmp_path: Path) -> None:
+def test_a_store_of_a_compromised_service_is_harmless(tmp_path: Path) -> None:
     """Its file names are part of a command for root, its contents of texts on root's terminal."""
     (tmp_path / "missions.db.corrupt-$(reboot)1").touch()
     assert_ok(check_database(tmp_path), "none stored yet")
@@ -65,6 +65,6 @@ def test_undervoltage_now_and_since_the_start() -> None:
     assert_ok(check_power(lambda *_: "throttled=0x0\n"), "no undervoltage since the start")
 
 
-def test_another_machine_does_not_have_this_check() -> None:
+def test_other_machines_skip_this_check() -> None:
     assert check_power(lambda *_: "") is None
     assert check_power(lambda *_: "VCHI initialization failed") is None

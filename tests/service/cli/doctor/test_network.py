@@ -64,7 +64,7 @@ _CLOSED = """table inet filter {
 """
 
 
-def test_a_firewall_that_drops_what_no_rule_accepts(pi: FaultyMachine) -> None:
+def test_a_firewall_with_a_drop_policy_is_reported(pi: FaultyMachine) -> None:
     _, found = ports(pi, rules=_CLOSED)
     assert_note(found, "the firewall (nftables) drops packets to UDP port 14550")
     assert found.remedy.startswith("sudo nft insert rule inet filter input udp dport 14550 accept")

@@ -70,7 +70,7 @@ def test_only_serial_ports_of_this_pi_are_offered(pi: FixablePi, monkeypatch: py
     assert pi.ask("overview")["ports"] == ["auto"]
 
 
-def test_no_way_back_without_an_update(pi: FixablePi) -> None:
+def test_a_downgrade_needs_an_earlier_update(pi: FixablePi) -> None:
     with pytest.raises(HelperRefusal, match="No earlier version"):
         pi.ask("downgrade")
 
@@ -80,7 +80,7 @@ def test_a_package_of_an_impossible_size(pi: FixablePi) -> None:
         pi.ask("install", size=1 << 40)
 
 
-def test_a_request_brings_no_command_path_or_process(pi: FixablePi) -> None:
+def test_requests_are_free_of_commands_paths_and_processes(pi: FixablePi) -> None:
     for fix in ("kill 1", "rm -rf /", "", "stop the program with pid 1", "restart the Pi", "restart the bridge\n"):
         with pytest.raises(HelperRefusal):
             pi.ask("fix", fix=fix)

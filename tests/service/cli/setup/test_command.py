@@ -71,7 +71,7 @@ def test_a_new_key_replaces_the_present_and_the_service_takes_it(pi: Pi) -> None
     assert pi.ran[-1] == "systemctl restart naze-bridge.service"
 
 
-def test_captured_output_does_not_have_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_captured_output_is_free_of_secrets(pi: Pi, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sentences, "is_terminal", lambda: False)
     state, password = pi.root / "var/lib/naze-bridge", tmp_path / "password"
     state.mkdir(parents=True)

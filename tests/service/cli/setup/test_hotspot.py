@@ -136,7 +136,7 @@ def test_a_hotspot_that_cannot_open_is_kept_if_it_is_the_only_way_to_the_pi(pi: 
     assert hotspot_name(pi) == " naze\\field"
 
 
-def test_a_kept_hotspot_is_opened_at_once_and_waits_for_no_device(pi: FaultyMachine) -> None:
+def test_a_kept_hotspot_opens_without_waiting_for_a_device(pi: FaultyMachine) -> None:
     (step,) = hotspot_steps(pi, _NETWORKS[0], is_kept=True)
     assert [change.describe() for change in step.changes[1:]] == [
         *("run nmcli connection reload", f"run nmcli connection up {CONNECTION}")

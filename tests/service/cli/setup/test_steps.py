@@ -142,7 +142,7 @@ def test_the_last_entry_for_all_models_in_config_txt_counts(tmp_path: Path, give
     assert ("enable the UART on the header" not in purposes) is is_on
 
 
-def test_setup_of_an_image_for_every_model_does_not_start_anything(tmp_path: Path) -> None:
+def test_setup_of_an_image_for_every_model_does_not_start_services(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     pi.path("/proc/device-tree/model").unlink()
     pi.path("/run/systemd/system/.keep").unlink()
