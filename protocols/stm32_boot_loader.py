@@ -58,8 +58,7 @@ def synchronise(within_s: float, is_waiting: Callable[[], None] = lambda: None) 
 
     INIT sets the speed after a reset. A boot loader that is in use takes it as a part of a command, whose rest the
     fillers complete with a wrong checksum. Before them INIT is sent only once: as a page number and the checksum, two
-    would erase the last page. Fillers alone could only erase page 0. `is_waiting` is called if there is no immediate
-    answer.
+    would erase the last page. Fillers alone could only erase page 0. `is_waiting` is called without a prompt answer.
     """
     yield _bytes(bytes((INIT,)), 1, _INIT_S)
     if (yield from end_command()):
@@ -85,7 +84,7 @@ def read_chip_id() -> Dialogue[int]:
 
 
 def read_memory(address: int, size: int) -> Dialogue[bytes]:
-    """Up to BLOCK_SIZE bytes. Without a checksum."""
+    """Up to BLOCK_SIZE bytes, without a checksum."""
     yield from _command(READ)
     yield from _step(_checked(address.to_bytes(4, "big")), READ)
     reply = yield from _step(_complemented(size - 1), READ, size)

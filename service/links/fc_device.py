@@ -24,8 +24,8 @@ DEVICE_ERRORS = (OSError, termios.error, ValueError)
 #: A poll takes 75 ms at 1200 baud.
 _LAST_FRAME_S = 0.1
 _TIMEOUT_S = 3.0
-#: A connection without a confirmation for this long is lost. After a gap in the Wi-Fi a new one carries
-#: data at once. The old connection might wait for as long again as the gap was.
+#: A connection without a confirmation for this long is lost. After a gap in the Wi-Fi a new connection carries data at
+#: once. The old one might wait for as long again as the gap was.
 _TCP_STALL_MS = 5000
 
 
@@ -92,8 +92,7 @@ def open_serial(path: str) -> serial.Serial:
 def send_last_frame(port: serial.Serial) -> None:
     """Let a frame end before the port closes: after half a frame a board reads the next requests as the rest of it.
 
-    Then drop the rest. The kernel would wait up to 30 s for a board that does not accept bytes, and the event loop with
-    it.
+    Then drop the rest. The kernel, and the event loop, would wait up to 30 s for a board that does not accept bytes.
     """
     end = time.monotonic() + _LAST_FRAME_S
     while port.out_waiting and time.monotonic() < end:

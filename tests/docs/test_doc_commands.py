@@ -38,7 +38,6 @@ NOT_RUN = {
     "naze-bridge sim --link /tmp/naze --core": "needs the compiled core: tests/e2e/test_compiled_core.py runs it",
     "make": "long, or changes the machine; its target is checked",
     "python examples/zenoh_router.py": "tests/support/zenoh_router.py runs it, for all tests of fleets",
-    "python examples/zenoh-tls/make_certificates.py": "tests/support/secured_fleet.py runs it",
     "python -m deb.sign": "needs the maintainer's key: tests/packaging/test_versions.py runs it",
     "ssh-keygen -t": "asks for a passphrase: tests/packaging/test_versions.py makes such a key",
     "git config": "changes the repository: tests/packaging/test_versions.py does so in a copy",

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's own SITL, which is not in this repository: INAV_SITL is the path of its program (CONTRIBUTING.md)."""
+"""INAV's own SITL, which is not in this repository: INAV_SITL is the path of its program.
+
+Before 8.0 a craft's sensors stand still there: fc_core.c needs 8.0's `ARMING_FLAG(SIMULATOR_MODE_HITL) ||` before
+`lockMainPID()`.
+"""
 
 import os
 import socket
