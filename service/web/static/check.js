@@ -16,7 +16,7 @@ async function examine() {
   const [problems, notes, fine] = Object.keys(GRADES).map(of);
   const rest = make("details", {}, make("summary", {}, `${fine.length} fine`), make("ul", { class: "findings" }, ...fine));
   findings.replaceChildren(make("ul", { class: "findings" }, ...problems, ...notes), rest);
-  return `${problems.length || "No"} ${problems.length === 1 ? "problem" : "problems"}.`;
+  return problems.length ? [`${problems.length} ${problems.length === 1 ? "problem" : "problems"}.`, "bad"] : "No problems.";
 }
 
 function finding({ check, grade, found, remedy, fix }) {

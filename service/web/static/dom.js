@@ -35,12 +35,13 @@ export const form = (attributes, submit, ...children) => make("form", { ...attri
 // A place for the result of an action.
 export const resultPlace = () => make("p", { class: "result", role: "status" });
 
-// Does `work` with the button disabled. The sentence it returns, or its error, appears in `result`.
+// Does `work` with the button disabled. Its sentence (or sentence and kind), or its error, appears in `result`.
 export async function pressed(button, result, work) {
   button.disabled = true;
   say(result, "", "Working …");
   try {
-    say(result, "good", (await work()) ?? "");
+    const [text = "", kind = "good"] = [await work()].flat();
+    say(result, kind, text);
   } catch (error) {
     say(result, "bad", error.message);
   }
@@ -48,10 +49,9 @@ export async function pressed(button, result, work) {
 }
 
 // A button that does `work`.
-export function action(text, result, work, kind = "") {
-  const button = make("button", { type: "button", class: kind || null, onclick: () => pressed(button, result, work) }, text);
-  return button;
-}
+export const action = (text, result, work, kind = "") => make("button", {
+  type: "button", class: kind || null, onclick: ({ currentTarget }) => pressed(currentTarget, result, work),
+}, text);
 
 // Numbered entries that open in place, the newest first in `entries`. Those already there stay, with what is open in them.
 export function showEntries(container, entries, { name, summary, contents }) {

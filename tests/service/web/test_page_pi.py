@@ -81,6 +81,7 @@ def test_first_questions_remedies_settings_and_log(browsers: Browsers, bench: tu
         page.show("check")
         press(page, "Check everything")
         page.wait_text("#findings", "Problem console")
+        assert "bad" in page.run("return document.querySelector('#doctor .result').className")
         assert fits_a_phone(page)
         assert violations(page) == []
         press(page, "Fix it: free the UART from the login console")
