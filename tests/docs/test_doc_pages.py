@@ -5,8 +5,6 @@ import re
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans, text_of
 from tests.support.programs import REPOSITORY
 
@@ -21,7 +19,6 @@ LANGUAGES = {
     "msp": "tests/docs/test_msp_mission_page.py",
     "text": "nothing: a drawing",
 }
-PAGE = pytest.mark.parametrize("page", PAGES, ids=place_of)
 
 
 def anchors(page: Path) -> set[str]:
@@ -52,14 +49,13 @@ def names() -> set[str]:
     }
 
 
-@PAGE
-def test_links_lead_to_pages_and_headings(page: Path) -> None:
+def test_links_lead_to_pages_and_headings() -> None:
     broken = []
-    for link in LINK.findall(prose_of(page)):
+    for page, link in ((each, link) for each in PAGES for link in LINK.findall(prose_of(each))):
         path, _, anchor = link.partition("#")
         target = page if not path else page.parent / path
         if "://" not in link and (not target.exists() or (anchor and anchor not in anchors(target))):
-            broken.append(link)
+            broken.append((place_of(page), link))
     assert broken == []
 
 
@@ -74,16 +70,15 @@ def test_every_page_is_linked_from_the_readme_or_from_a_page_that_is() -> None:
     assert {*PAGES, REPOSITORY / "docs" / "cli.md"} - reached == set()
 
 
-@PAGE
-def test_files_in_the_text_exist(page: Path) -> None:
-    for span in spans(page):
+def test_files_in_the_text_exist() -> None:
+    for page, span in ((each, span) for each in PAGES for span in spans(each)):
         folder = span.partition("/")[0]
         is_key = span.startswith("fleet/") and not span.endswith(("/", ".py"))  # of zenoh, under the default prefix
         is_source = folder not in ("", "build", "dist") and (REPOSITORY / folder).is_dir()
         if is_source and "/" in span and " " not in span and not is_key:
-            assert (REPOSITORY / span).exists() or (page.parent / span).exists(), span
+            assert (REPOSITORY / span).exists() or (page.parent / span).exists(), (place_of(page), span)
         elif re.fullmatch(r"[\w-]+\.(py|c|h|md)", span):
-            assert span in files(), span
+            assert span in files(), (place_of(page), span)
 
 
 def test_pages_named_in_the_code_exist() -> None:
@@ -112,10 +107,9 @@ def test_every_block_has_a_language_with_a_test() -> None:
     assert {block.place.partition(":")[0] for block in blocks() if block.language == "msp"} == {"docs/msp-mission.md"}
 
 
-@PAGE
-def test_all_blocks_are_fenced(page: Path) -> None:
-    indented = re.findall(r"\n\n(?! *[-*|]| *\d+\.) {4,}\S.*", prose_of(page))
-    assert indented == []
-    assert text_of(page).count("```") == 2 * len(
-        [block for block in blocks() if block.place.startswith(f"{place_of(page)}:")]
-    )
+def test_all_blocks_are_fenced() -> None:
+    for page in PAGES:
+        place = place_of(page)
+        assert re.findall(r"\n\n(?! *[-*|]| *\d+\.) {4,}\S.*", prose_of(page)) == [], place
+        count = len([block for block in blocks() if block.place.startswith(f"{place}:")])
+        assert text_of(page).count("```") == 2 * count, place

@@ -47,19 +47,6 @@ def flashing(start: Starter) -> FlashingBench:
     return FlashingBench(start)
 
 
-def test_the_patch_is_flashed_after_a_backup_and_must_answer(flashing: FlashingBench) -> None:
-    status, said = flashing.flash("flash", str(flashing.image), "--battery")
-    assert status == 0, said
-    assert said.startswith(
-        "Harakiri with the mission extension runs; the flash was verified. Backup of the previous flash:"
-    )
-    assert flashing.controller == "Harakiri with the mission extension"
-    (backup,) = flashing.backups
-    assert str(backup) in said
-    assert len(backup.read_bytes()) == 128 * 1024
-    assert backup.with_suffix(".txt").read_text().startswith("Config:\nFW: simulated\n")
-
-
 def test_settings_that_the_new_firmware_has_forgotten_are_restored(start: Starter) -> None:
     flashing = FlashingBench(start, "--boot", "300")
     daemon = ("--state-dir", flashing.state_dir)
@@ -88,14 +75,21 @@ def test_after_an_unplugged_cable_the_board_waits_and_the_backup_leads_back(flas
     assert flashing.controller == "Harakiri without the mission extension"
 
 
-def test_without_a_daemon_the_backup_goes_to_the_given_folder(start: Starter) -> None:
+def test_without_a_daemon_the_patch_is_flashed_after_a_backup_and_must_answer(start: Starter) -> None:
     board, image, state_dir = start.board(*_BOARD), start.directory / "patched.bin", start.directory / "mine"
     image.write_bytes(stand_in(patched=True))
     words = ("--battery", "--fc", str(board.link), "--state-dir", str(state_dir))
     program = start.program("flash.log", "firmware", "flash", str(image), *words)
-    backups = state_dir / "firmware"
-    assert happens(lambda: not program.is_alive or any(backups.glob("*.bin")), _LONGEST_S), program.printed
-    assert any(backups.glob("*.bin")), program.printed
+    assert happens(lambda: not program.is_alive, _LONGEST_S), program.printed
+    status, said = program.end(), " ".join(program.printed.split())
+    assert status == 0, said
+    assert said.startswith(
+        "Harakiri with the mission extension runs; the flash was verified. Backup of the previous flash:"
+    )
+    (backup,) = (state_dir / "firmware").glob("*.bin")
+    assert str(backup) in said
+    assert len(backup.read_bytes()) == 128 * 1024
+    assert backup.with_suffix(".txt").read_text().startswith("Config:\nFW: simulated\n")
 
 
 def test_without_a_daemon_a_battery_is_noticed_before_the_first_change(start: Starter) -> None:

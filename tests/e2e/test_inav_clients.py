@@ -20,7 +20,6 @@ from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
 from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plan import HOME, PlanRow, as_items, stored_fields, waypoint
-from tests.support.programs import until
 
 RULES = NavRules(NavProfile())
 #: Anticlockwise, as INAV stores it.
@@ -193,14 +192,3 @@ def test_mavproxy_loads_lists_and_clears_120_records(inav: Bench, tmp_path: Path
         mavproxy.type("wp list")
         # Only home is left.
         mavproxy.wait_for("Requesting 1 waypoints")
-
-
-def test_after_a_board_restart_the_reported_mission_is_right(start: Starter) -> None:
-    board = start.board("--kind", "inav", tcp=True)
-    daemon = start.daemon(board.fc)
-    daemon.wait()
-    daemon.push(nav_plan(20))
-    assert daemon.pull()["count"] == 20
-    board.end()
-    until(lambda: (status := daemon.status()) is not None and status["flight_controller"] is None, "the loss")
-    assert daemon.is_alive

@@ -4,7 +4,6 @@
 import json
 import pwd
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,10 +11,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from protocols.mission_file import write_qgc_wpl
 from service.cli.main import main
 from tests.support.benches import Starter
-from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import Board, run_naze_bridge
 
 
@@ -32,17 +29,6 @@ def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *par
     assert not [part for part in parts if part not in sentence], sentence
 
 
-def test_a_pushed_mission_is_pulled_unchanged(board: Board, tmp_path: Path) -> None:
-    plan = plain_plan(5)
-    file = tmp_path / "plan"
-    file.write_text(plan_text(plan))
-    assert run_naze_bridge("push", file, "--fc", board.link).returncode == 0
-    assert board.records() == records_of(judge(plan))
-    assert run_naze_bridge("pull", tmp_path / "held", "--fc", board.link).returncode == 0
-    assert (tmp_path / "held").read_text() == write_qgc_wpl(judge(plan).items)
-    board.assert_unharmed()
-
-
 def test_status_waits_for_telemetry(tmp_path: Path) -> None:
     """At 9600 baud a round of polls takes longer than identifying the flight controller."""
     with ExitStack() as stack:
@@ -55,17 +41,6 @@ def test_status_waits_for_telemetry(tmp_path: Path) -> None:
 
 def test_a_missing_port_is_reported_in_one_sentence(tmp_path: Path) -> None:
     assert_one_sentence(run_naze_bridge("status", "--fc", tmp_path / "naze"), 1, "is missing", str(tmp_path))
-
-
-def test_a_port_used_by_another_program_is_reported_in_one_sentence(board: Board) -> None:
-    script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
-    with subprocess.Popen(
-        [sys.executable, "-c", script, str(board.link)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as other:
-        assert other.stdout is not None
-        assert other.stdout.readline() == "open\n"
-        assert_one_sentence(run_naze_bridge("pull", "--fc", board.link), 1, "is busy", "has it open")
-        other.kill()
 
 
 def test_a_tcp_port_without_a_listener_is_reported_in_one_sentence() -> None:

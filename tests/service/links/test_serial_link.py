@@ -14,7 +14,6 @@ from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from service.links import serial_link
-from service.settings.addresses import AddressError, parse_gcs
 from tests.support.links import Links
 from tests.support.packing import pack
 from tests.support.programs import TIMEOUT_S, until_async
@@ -134,9 +133,3 @@ async def test_an_unplugged_radio_comes_back(
     await until_async(lambda: links.events.default_peers, "its return")
     os.write(radio.descriptor, frame := FrameWriter(255, 190).frame(pack(HEARTBEAT), 2))
     await until_async(lambda: links.events.received == [(Peer(link.name, f"{tmp_path}/ttyUSB1"), frame)], "a frame")
-
-
-def test_a_radio_is_given_by_path_and_speed() -> None:
-    assert str(parse_gcs("/dev/ttyUSB1,57600")) == "/dev/ttyUSB1,57600"
-    with pytest.raises(AddressError, match="lacks the radio's serial speed; add it, as in /dev/ttyUSB1,57600"):
-        parse_gcs("/dev/ttyUSB1")

@@ -67,6 +67,15 @@ def test_a_crowd_of_addresses_does_not_keep_the_page_from_another(hosts: int) ->
     assert all(each.is_aborted or each.served_at is not None for each in page)
 
 
+def test_30_connections_are_served_at_once_and_100_in_each_second() -> None:
+    limit = ConnectionLimit()
+    crowd = [Visitor(f"10.0.0.{number}", limit).visit() for number in range(150)]
+    served = [sum(each.served_at is not None for each in crowd)]
+    pass_time(limit, 1)
+    served.append(sum(each.served_at is not None for each in crowd))
+    assert served == [pytest.approx(30, abs=1), pytest.approx(130, abs=1)]
+
+
 def test_an_ipv6_host_counts_as_one_with_any_of_the_addresses() -> None:
     limit = ConnectionLimit()
     page = Visitor("fe80::1%wlan0", limit).visit()

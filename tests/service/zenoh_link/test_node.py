@@ -100,14 +100,6 @@ def upload_while(bench: Bench, router: Router, blow: signal.Signals) -> None:
     bench.board.assert_unharmed()
 
 
-def test_an_upload_succeeds_although_the_router_dies(start: Starter, tmp_path: Path) -> None:
-    where = endpoint()
-    bench = zenoh_bench(start, f'connect = ["{where}"]')
-    with running_router(tmp_path, where) as router, session(connect=where) as opened:
-        Reader(opened).wait("telemetry/attitude")
-        upload_while(bench, router, signal.SIGKILL)
-
-
 def test_an_upload_succeeds_although_the_router_hangs(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
     bench = zenoh_bench(start, f'connect = ["{where}"]')

@@ -14,10 +14,12 @@ from pathlib import Path
 
 import pytest
 import serial
+from click.testing import CliRunner
 
 from protocols.mission_item import identify, pack_records
 from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.mission import INFO_REQUEST, decode_info, encode_begin, encode_chunk, encode_commit
+from simulator.commands.sim import sim
 from simulator.links.pipe_link import SimLink
 from simulator.naze.board import SimulatedNaze
 from tests.support.naze_bench import mission
@@ -203,10 +205,8 @@ def test_it_ends_cleanly(start: Callable[..., Simulator], tmp_path: Path, number
 def test_obstacles_at_start_are_reported(tmp_path: Path, options: list[str], complaint: str) -> None:
     (tmp_path / "file").write_text("mine")
     (tmp_path / "link").symlink_to("file")
-    program = "from simulator.commands.sim import sim; sim()"
-    arguments = [option.format(tmp_path) for option in options]
-    done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
+    done = CliRunner().invoke(sim, [option.format(tmp_path) for option in options])
+    assert done.exit_code == 1
     assert done.stderr.startswith(complaint.format(tmp_path))
     assert (tmp_path / "link").readlink() == Path("file")
     assert (tmp_path / "file").read_text() == "mine"
