@@ -23,6 +23,8 @@ settings.load_profile("unhurried")
 _LONG = (
     "tests/packaging/test_debian_package",
     "tests/firmware/test_firmware_core",
+    "tests/e2e/test_firmware",
+    "tests/service/web/test_firmware_upload",
     "tests/e2e/test_mission_planner",
     "tests/bridge/controllers/harakiri/test_mission_store",
     "tests/e2e/test_soak",
@@ -31,7 +33,10 @@ _LONG = (
 #: Folders of tests that mostly wait for programs, those with the longest files first.
 _WAITING = tuple(
     f"tests/{name}/"
-    for name in ("service/web", "fleet", "e2e", "attack", "service/cli", "service/links", "service/settings")
+    for name in (
+        *("service/web", "fleet", "e2e", "attack", "service/cli", "service/zenoh_link", "service/links"),
+        *("service/settings", "simulator/links", "simulator/commands"),
+    )
 )
 #: The marker `slow`, which an inner loop leaves out: these folders and files.
 _SLOW = (
