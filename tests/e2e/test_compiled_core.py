@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MAVSDK, daemon, pty and simulated UART with the flight controller's real C code."""
 
-import random
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import pytest
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
-from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError, MissionRawResult
-from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawResult
 
 from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
@@ -20,8 +17,6 @@ from tests.support.programs import run_naze_bridge, until
 
 OLD, NEW = mixed_plan(60), plain_plan(146, start=40)
 OLD_RECORDS, NEW_RECORDS = records_of(judge(OLD)), records_of(judge(NEW))
-# Flash writes of a list in a blank slot: records, header, seal.
-NEW_OPERATIONS = len(NEW_RECORDS) + 2
 
 
 def start_on_core(start: Starter) -> tuple[Bench, Path]:
@@ -45,12 +40,6 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench, Path
         bench.board.assert_unharmed()
 
 
-async def wait_for_armed(vehicle: Any, *, armed: bool) -> None:
-    async for now in TelemetryAsync(vehicle).subscribe_armed():
-        if now is armed:
-            break
-
-
 async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> None:
     (bench, flash), plan = core, mixed_plan(146)
     board, records = bench.board, records_of(judge(plan))
@@ -70,26 +59,10 @@ async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> 
         assert board.stats()["flash_writes"] == written + 1
 
 
-async def test_a_write_while_armed_is_refused(core: tuple[Bench, Path]) -> None:
-    bench, _ = core
-    bench.daemon.push(OLD)
-    async with vehicle_at(bench.daemon.port) as vehicle:
-        bench.board.set("armed 1")
-        await wait_for_armed(vehicle, armed=True)
-        assert await refusal_of(MissionRawAsync(vehicle), NEW) == MissionRawResult.DENIED
-        assert bench.board.records() == OLD_RECORDS
-        bench.board.set("armed 0")
-        await wait_for_armed(vehicle, armed=False)
-        await MissionRawAsync(vehicle).upload_mission(raw_items(NEW))
-    assert bench.board.records() == NEW_RECORDS
-
-
-@pytest.mark.parametrize("seed", range(2))
-async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: Starter, seed: int) -> None:
+async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: Starter) -> None:
     bench, flash = start_on_core(start)
     bench.daemon.push(OLD)
-    cut = random.Random(seed).randint(1, NEW_OPERATIONS)
-    bench.board.set(f"power_cut_at_flash_operation {cut}")
+    bench.board.set(f"power_cut_at_flash_operation {len(NEW_RECORDS) // 2}")
     async with vehicle_at(bench.daemon.port) as vehicle:
         missions = MissionRawAsync(vehicle)
         # On a loaded machine MAVSDK may give up first: it does not repeat its last item.
@@ -102,23 +75,6 @@ async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: 
         assert bench.daemon.pull()["records"] == OLD_RECORDS
         await missions.upload_mission(raw_items(NEW))
     assert bench.board.records() == bench.daemon.pull()["records"] == NEW_RECORDS
-
-
-async def test_bit_errors_keep_lists_intact(start: Starter) -> None:
-    bench, _ = start_on_core(start)
-    bench.daemon.push(OLD)
-    bench.board.set("bit_error_rate 0.001")
-    async with vehicle_at(bench.daemon.port) as vehicle:
-        missions = MissionRawAsync(vehicle)
-        for _ in range(5):
-            try:
-                await missions.upload_mission(raw_items(NEW))
-            except MissionRawError:
-                assert bench.board.records() in (OLD_RECORDS, NEW_RECORDS)
-                bench.daemon.wait()
-            else:
-                break
-        assert bench.board.records() == NEW_RECORDS
 
 
 def test_a_library_that_is_not_the_core_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real MAVSDK, MAVProxy and DroneKit show a flown circle like the simulated craft flew it.
+"""The real MAVSDK and DroneKit show a flown circle like the simulated craft flew it.
 
 Polls, the ground station's own rate and this process delay a value by half a second at most. The craft flies at
 2.5 m/s on a circle of 25 m (6 degrees a second) and initially climbs at 2.5 m/s. The tolerances are its motion
@@ -9,11 +9,8 @@ during that delay and MSP's rounding.
 import asyncio
 import json
 import math
-import re
-import time
 from collections.abc import AsyncIterator, Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,7 +21,6 @@ from simulator.board.flight import FIELD_LAT_E7, METRES_PER_DEGREE
 from tests.e2e.test_mavsdk import vehicle_at
 from tests.support import dronekit
 from tests.support.benches import Bench
-from tests.support.mavproxy import MavProxy
 from tests.support.programs import TIMEOUT_S, happens
 
 POSITION_M = 1.5
@@ -133,53 +129,6 @@ async def test_mavsdk_shows_the_flight_correctly(bench: Bench) -> None:
                 assert shown.name == name
 
             await agrees(telemetry.subscribe_flight_mode(), mode, times=1)
-
-
-def shown_by(mavproxy: MavProxy, name: str) -> dict[str, float]:
-    """The fields of a message as printed by MAVProxy's `status`."""
-    mavproxy.type(f"status {name}")
-    printed = mavproxy.wait_for(f"{name} {{")
-    (line,) = re.findall(rf"{name} {{(.*)}}", printed)
-    fields = (field.split(" : ") for field in line.split(", ") if " : " in field)
-    return {key.strip(): float(value) for key, value in fields if re.fullmatch(r"[-\d.e+]+", value)}
-
-
-def test_mavproxy_shows_the_flight_correctly(bench: Bench, tmp_path: Path) -> None:
-    modules = "--default-modules=wp,param,arm,mode,fence,battery"
-    with MavProxy(tmp_path, bench.daemon.port, modules) as mavproxy:
-        bench.board.set("armed 1")
-        mavproxy.wait_for("ARMED")
-        for _ in range(5):
-            time.sleep(1)
-            check_position(bench, mavproxy)
-        hud, now = shown_by(mavproxy, "VFR_HUD"), truth(bench)
-        assert hud["groundspeed"] == pytest.approx(now["speed_ms"], abs=SPEED_MS)
-        assert degrees_between(hud["heading"], now["heading"]) <= DIRECTION_DEG
-        assert hud["throttle"] == 45
-        attitude, now = shown_by(mavproxy, "ATTITUDE"), truth(bench)
-        assert math.degrees(attitude["roll"]) == pytest.approx(now["roll"], abs=TILT_DEG)
-        assert math.degrees(attitude["pitch"]) == pytest.approx(-now["pitch"], abs=TILT_DEG)
-        battery = shown_by(mavproxy, "SYS_STATUS")["voltage_battery"] / 1000
-        assert battery == pytest.approx(truth(bench)["volts"], abs=VOLTAGE_V)
-        channels = shown_by(mavproxy, "RC_CHANNELS")
-        assert [channels[f"chan{number}_raw"] for number in range(1, 6)] == [1500, 1500, 1450, 1500, 2000]
-        for boxes, mode in ((1 << 2, "ALT_HOLD"), (1 << 7, "LOITER"), (1 << 6, "RTL"), (0, "ACRO")):
-            bench.board.set(f"boxes {boxes}")
-            mavproxy.wait_for(f"Mode {mode}")
-        printed = (tmp_path / "mavproxy.log").read_text()
-    assert not re.search("breach|fail|unhealthy", printed, re.IGNORECASE)
-
-
-def check_position(bench: Bench, mavproxy: MavProxy) -> None:
-    """MAVProxy requests four a second; a busy machine may print late, so retry."""
-
-    def agrees_now() -> bool:
-        position, now = shown_by(mavproxy, "GLOBAL_POSITION_INT"), truth(bench)
-        near = metres_from(now, position["lat"] / 1e7, position["lon"] / 1e7) <= POSITION_M
-        high = abs(position["relative_alt"] / 1000 - now["height_m"]) <= HEIGHT_M
-        return near and high and degrees_between(position["hdg"] / 100, now["heading"]) <= DIRECTION_DEG
-
-    assert happens(agrees_now)
 
 
 def shows_mode(vehicle: Any, name: str) -> bool:

@@ -48,7 +48,7 @@ def test_a_push_under_way_is_finished(world: World) -> None:
     assert world.stored == records_of(NEW)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(16))
 def test_a_push_may_be_aborted_at_any_moment(world: World, seed: int) -> None:
     """The result is true, and the board accepts the next list."""
     outcome = world.push(NEW)

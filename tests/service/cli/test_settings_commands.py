@@ -36,6 +36,13 @@ def tuned(start: Starter) -> Daemon:
     return daemon
 
 
+@pytest.fixture
+def unchanged(daemon: Daemon) -> Daemon:
+    """The same for tests that change nothing."""
+    until(lambda: history(daemon), "the first backup")
+    return daemon
+
+
 def test_settings_are_listed_changed_and_saved(tuned: Daemon) -> None:
     listed = settings(tuned, "list").stdout
     assert "p_roll" in listed
@@ -55,13 +62,13 @@ def test_settings_are_listed_changed_and_saved(tuned: Daemon) -> None:
     assert negative.returncode == 0, negative
 
 
-def test_an_unsettable_name_is_reported_in_one_sentence(tuned: Daemon) -> None:
-    assert_one_sentence(settings(tuned, "set", "p_roll", "999"), 1, "p_roll stays 35")
-    assert_one_sentence(settings(tuned, "set", "p_roll", "high"), 1, "p_roll cannot be high: it must be 1..200")
-    assert_one_sentence(settings(tuned, "set", "gbl_flg", "5"), 1, "gbl_flg stays")
-    assert_one_sentence(settings(tuned, "get", "p_rol"), 1, "has no setting p_rol: did you mean p_roll?")
-    assert_one_sentence(settings(tuned, "set", "p_roll", "inf"), 1, "p_roll stays 35")
-    assert len(history(tuned)) == 1
+def test_an_unsettable_name_is_reported_in_one_sentence(unchanged: Daemon) -> None:
+    assert_one_sentence(settings(unchanged, "set", "p_roll", "999"), 1, "p_roll stays 35")
+    assert_one_sentence(settings(unchanged, "set", "p_roll", "high"), 1, "p_roll cannot be high: it must be 1..200")
+    assert_one_sentence(settings(unchanged, "set", "gbl_flg", "5"), 1, "gbl_flg stays")
+    assert_one_sentence(settings(unchanged, "get", "p_rol"), 1, "has no setting p_rol: did you mean p_roll?")
+    assert_one_sentence(settings(unchanged, "set", "p_roll", "inf"), 1, "p_roll stays 35")
+    assert len(history(unchanged)) == 1
 
 
 def test_modes_are_listed_with_channel_and_pulses(start: Starter) -> None:
@@ -74,8 +81,8 @@ def test_modes_are_listed_with_channel_and_pulses(start: Starter) -> None:
     assert [row for row in rows if row[0] == "MODE_ANGLE"] == ranges
 
 
-def test_a_board_without_mode_ranges_says_so(tuned: Daemon) -> None:
-    assert_one_sentence(settings(tuned, "modes"), 1, "has boxes instead of mode ranges")
+def test_a_board_without_mode_ranges_says_so(unchanged: Daemon) -> None:
+    assert_one_sentence(settings(unchanged, "modes"), 1, "has boxes instead of mode ranges")
 
 
 def test_a_file_is_backed_up_compared_and_restored(tuned: Daemon, tmp_path: Path) -> None:
@@ -142,12 +149,12 @@ def test_settings_that_cannot_be_restored_are_named(tuned: Daemon, tmp_path: Pat
     assert value(tuned, "p_roll") == "44"
 
 
-def test_an_unreadable_file_is_reported_in_one_sentence(tuned: Daemon, tmp_path: Path) -> None:
+def test_an_unreadable_file_is_reported_in_one_sentence(unchanged: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "bad.param"
-    assert_one_sentence(settings(tuned, "restore", file), 2, "No such file")
+    assert_one_sentence(settings(unchanged, "restore", file), 2, "No such file")
     file.write_text("p_roll;44\n")
-    assert_one_sentence(settings(tuned, "restore", file), 2, "line 1")
-    assert_one_sentence(settings(tuned, "backup", tmp_path / "none" / "x"), 1, "No such file")
+    assert_one_sentence(settings(unchanged, "restore", file), 2, "line 1")
+    assert_one_sentence(settings(unchanged, "backup", tmp_path / "none" / "x"), 1, "No such file")
 
 
 def test_a_backup_without_a_daemon(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 """Access to the status page: reading, writing with the token, and bad requests."""
 
 import socket
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -154,18 +155,16 @@ def test_bad_bytes_end_only_their_connection(shared_web: WebBench, name: str) ->
     assert "Traceback" not in shared_web.daemon.printed
 
 
-@pytest.mark.parametrize("in_pieces", [False, True])
-@pytest.mark.parametrize("method", [b"GET /api/state", b"POST /api/check", b"POST /api/missions/1/restore"])
-def test_malformed_chunks_do_not_raise(web: WebBench, method: bytes, in_pieces: bool) -> None:
-    head = b"%b HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" % method
+def test_malformed_chunks_do_not_raise(web: WebBench) -> None:
     bodies = (b"zz\r\n", b"-1\r\n\r\n", b"1\r\nabc\r\n", b"f" * 40, b"1;" + b"a" * 70_000, b"0\r\n\xff\r\n\r\n")
-    for body in bodies:
-        raw(web, *([head, body] if in_pieces else [head + body]))
-        raw(web, *([head + b"1\r\na\r\n", body] if in_pieces else [head + b"1\r\na\r\n" + body]))
+    for method in (b"GET /api/state", b"POST /api/check", b"POST /api/missions/1/restore"):
+        head = b"%b HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" % method
+        for start, body in product((head, head + b"1\r\na\r\n"), bodies):
+            raw(web, start, body)
+            raw(web, start + body)
     assert web.ask("/api/state").status == 200
-    assert "Traceback" not in web.daemon.printed
-    assert "exc_info" not in web.daemon.printed
-    assert "web.failed" not in web.daemon.printed
+    for sign in ("Traceback", "exc_info", "web.failed"):
+        assert sign not in web.daemon.printed
 
 
 @pytest.mark.parametrize("head", [b"Content-Length: 1000000000000", b"Transfer-Encoding: chunked"])
