@@ -310,7 +310,7 @@ class Bridge:
             self._types.lost(self._readiness.refusal, FC_LOST, now)
         self._follow_line(now)
 
-    # Between the parts.
+    # Events from one part to another.
 
     def _newcomer(self, station: GroundStation, now: float) -> None:
         if not self.is_passing_through:

@@ -38,7 +38,7 @@ FLIGHTS = {
     "Harakiri: holds, turns, radii, the place and height of RETURN_TO_LAUNCH": f"{_CORE}::check_leave",
     "Harakiri: heights on the way, fly through or brake, the nose on a ROI, LAND where it is": f"{_CORE}::check_step",
     "Harakiri: whole lists on the emulated board": f"{_BOARD}::test_a_mission_is_flown",
-    "INAV: first place too far, also of a ROI; jumps": (
+    "INAV: first place too far, also of a ROI, after jumps": (
         f"{_ARMING}::test_it_arms_exactly_with_the_lists_that_the_rules_accept"
     ),
     "INAV: nav_wp_max_safe_distance": (f"{_ARMING}::test_a_distant_first_place_arms_within_nav_wp_max_safe_distance"),
@@ -56,7 +56,7 @@ FLIGHTS = {
     "INAV: CONDITION_YAW, ROI": f"{_LIMITS}::test_the_nose_turns_as_the_record_says",
     "INAV: return to a safehome": f"{_LIMITS}::test_a_return_goes_to_the_reported_safehome",
     "INAV: RTL that lands, or not": f"{_LIMITS}::test_the_last_record_decides_if_a_return_lands",
-    "INAV: geozone on the way, also after a jump; its heights; without an action": (
+    "INAV: geozone on the way or after a jump, with heights, without an action": (
         f"{_ZONES}::test_a_mission_stops_at_a_zone_as_reported"
     ),
     "INAV: geozone with the action RTH": f"{_ZONES}::test_it_returns_from_a_zone_with_that_action",

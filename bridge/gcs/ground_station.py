@@ -244,7 +244,7 @@ class GroundStation:
         self.budget = budget
         #: None once it is known that the station receives what is sent to its address.
         self.return_path: ReturnPath | None = None
-        #: It has sent a valid signature.
+        #: True once the station has sent a valid signature.
         self.has_key = False
         self._settle_rights()
         self.splitter = MavlinkSplitter()

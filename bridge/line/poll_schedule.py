@@ -268,7 +268,7 @@ class PollSchedule:
             slot.expect(len(frame.payload))
             self._fit()
         elif is_slowed:
-            # The others follow with their own replies.
+            # The other polls are adjusted with their own replies.
             slot.set_interval(self._present_interval(slot))
 
     def due(self, link: MspLink) -> float:

@@ -39,7 +39,7 @@ class KnownSettings:
 
     def __init__(self, memory: SettingsMemory) -> None:
         self._memory = memory
-        #: Also of a board that is armed or lost since.
+        #: Kept while the board is armed or lost.
         self.table: SettingTable | None = None
         self.freshness = Freshness.UNREAD
         #: The board that was found, or None until it is identified.

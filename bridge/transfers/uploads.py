@@ -300,7 +300,7 @@ class MissionUploads:
         state, to = upload.state, upload.sender
         if isinstance(state, Receiving):
             self.due = min(self.due, state.list.request.due)
-        # By id 40: all that Mission Planner understands in both modes.
+        # MISSION_REQUEST (40), because in INT mode Mission Planner understands only that.
         ids, kind = (to.sysid, to.compid), self._missions.mission_type
         make = partial(messages.MAVLink_mission_request_message, *ids, mission_type=kind)
         to.to(*map(make, seqs))

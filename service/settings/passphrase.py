@@ -9,7 +9,7 @@ import math
 import secrets
 import string
 
-#: Beyond the reach of guessing.
+#: Too many bits to guess.
 LEAST_BITS = 80
 #: No character that looks like another, and no capitals to type on a phone.
 _ALPHABET = "abcdefghjkmnpqrstvwxyz23456789"

@@ -263,7 +263,7 @@ def _moved(safehome: Safehome, place: tuple[int, int]) -> Safehome:
 
 
 def rally_items(safehomes: Sequence[Safehome]) -> tuple[MissionItem, ...]:
-    """Those that are on."""
+    """The enabled safehomes as rally points."""
     places = [each for each in safehomes if each.enabled]
     frame = int(Frame.GLOBAL_RELATIVE_ALT)
     return tuple(

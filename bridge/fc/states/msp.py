@@ -13,8 +13,8 @@ from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_disarmed_h
 from protocols.msp.command_line import RUB_OUT_LINE, typed_and_rubbed_out
 from protocols.msp.frame import Direction, MspFrame, MspParser
 
-#: The same while bytes arrive that are not MSP: it was armed, and sends telemetry now. On a slow line a Harakiri's
-#: MAVLink is torn: before the change is believed, this many bytes may pass without a whole frame.
+#: The time without MSP after which foreign bytes mean that the board was armed and sends telemetry. On a slow line a
+#: Harakiri's MAVLink is torn: before the change is believed, this many bytes may pass without a whole frame.
 _FOREIGN_SILENCE_S = 0.5
 _BYTES_BEFORE_CHANGE = 300
 _FOREIGN_SIZE = 16

@@ -4,5 +4,5 @@
 systemd starts it for each connection to one of its sockets, which only the service's user may open: one for each set of
 privileges (service/machine/helper_socket.py). A connection carries one request, a line of JSON such as
 {"action": "fix", "fix": "restart the bridge"}, and one reply. `actions.py` has all actions. They do not run a
-shell, or takes a command, a path or a process id.
+shell, or take a command, a path or a process id.
 """
