@@ -19,7 +19,7 @@ from payloads.overview import state_of
 _TIMEOUT_S = 5.0
 #: When none of the missing replies has arrived for this long, their bridges are shown as not answering.
 _PAUSE_S = 2.0
-#: Replies of a large fleet may arrive for as long as this, times the pause.
+#: The replies of a large fleet may take this many pauses.
 _PAUSES = 15
 
 

@@ -28,7 +28,7 @@ DAMAGED = "DAMAGED"  # the outcome in a list if the row does not match the check
 
 #: The size limit of the store, bytes.
 BUDGET = 200 << 20
-#: So that not every mission pays for the search.
+#: Missions deleted together, because the search for them is slow.
 _DELETED_AT_ONCE = 20
 _MOST_SENDERS = 16
 _BUDGET_IN_MEMORY = 8 << 20

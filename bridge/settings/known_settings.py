@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of the board's settings, and how far it can be relied on.
+"""The board's settings as last read, and how reliable they are.
 
 The settings of each board are remembered, so that a change without the bridge between two flights is noticed.
 """
@@ -23,7 +23,7 @@ from bridge.model.settings import (
 
 
 class Freshness(IntEnum):
-    """How far the table is the board's."""
+    """How reliably the table matches the board."""
 
     #: Not read from this board since it was found.
     UNREAD = 0
@@ -55,7 +55,7 @@ class KnownSettings:
         self._occasion = Occasion.CONNECTED
 
     def found(self) -> None:
-        """Another board, or the same again."""
+        """A board was found, perhaps the same again."""
         self.freshness, self.board = Freshness.UNREAD, None
         self._occasion = Occasion.CONNECTED
 

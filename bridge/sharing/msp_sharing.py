@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Answers MSP requests of other programs, from the last replies to the bridge itself or from the flight controller.
 
-A known reply takes no line time, in flight and during a mission transfer, too. The others are requested
-one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part of the
-line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s the
+A known reply does not use the line, so it is given in flight and during a mission transfer, too. The others are
+requested one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part
+of the line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s the
 program is disconnected, because programs misread MSP's error reply: INAV Configurator mistakes it for success.
 """
 
