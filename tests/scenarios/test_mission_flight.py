@@ -118,7 +118,7 @@ def test_the_reported_leg_is_the_boards_own() -> None:
     assert (way.wp_dist, way.target_bearing, way.nav_bearing, way.alt_error) == (42, -90, -90, -3.5)
 
 
-def test_in_mavlink_the_way_follows_from_the_item() -> None:
+def test_in_mavlink_the_leg_follows_from_the_item() -> None:
     flight = Flight(MAVLINK)
     flight.reports(LEG)
     assert flight.last("NAV_CONTROLLER_OUTPUT").wp_dist > 0

@@ -209,5 +209,5 @@ def test_every_text_matches_the_board_and_the_state(kind: str) -> None:
     assert false == []
 
 
-def test_each_condition_is_of_a_sentence() -> None:
+def test_each_condition_belongs_to_a_sentence() -> None:
     assert TRUE.keys() <= TABLE.keys()

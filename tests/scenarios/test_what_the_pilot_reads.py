@@ -108,7 +108,7 @@ class TestConnecting:
         assert screens.mission_planner.heard() == [NOT_FOUND]
         assert screens.mission_planner.line.longest_gap_s(12, world.now) < 1.1
 
-    def test_no_receiver_is_missing_before_the_channels_are_read(self) -> None:
+    def test_the_receiver_is_not_missing_before_the_channels_are_read(self) -> None:
         """Mission Planner's "NO RC Receiver" was also shown while nothing asked the board for its channels."""
         world, station, screens = on_the_ground()
         ask(station, m.MAVLink_command_long_message(1, 1, 511, 0, m.MAVLINK_MSG_ID_RC_CHANNELS, -1, 0, 0, 0, 0, 0))

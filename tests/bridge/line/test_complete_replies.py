@@ -49,7 +49,7 @@ def test_a_request_that_was_sent_later_is_answered_later() -> None:
     assert link.complete_at >= later + (len(request(Msp.RC)) + len(reply(Msp.RC))) * BYTE_S
 
 
-def test_after_a_part_only_the_rest_is_waited_for() -> None:
+def test_only_the_rest_of_a_partial_reply_is_awaited() -> None:
     link = asking(poll(Msp.STATUS), poll(Msp.RC))
     later = NOW + 0.005
     link.receive(reply(Msp.STATUS) + reply(Msp.RC)[:5], later)

@@ -35,7 +35,7 @@ def test_a_lost_reply_is_asked_for_again_but_not_forever(lost: int) -> None:
     assert (result, sent) == ((reply(), lost + 1) if lost < 3 else (None, 3))
 
 
-def test_a_reply_is_believed_once_it_came_twice_in_a_row() -> None:
+def test_a_reply_is_accepted_after_two_equal_readings() -> None:
     first, second = reply(b"a"), reply(b"b")
     assert carry_out(ask_surely(request(IDENT), IDENT, 1), first, second, second) == (second, 3)
     assert carry_out(ask_surely(request(IDENT), IDENT, 1), *[first, second] * 3) == (None, 5)

@@ -278,7 +278,7 @@ def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_acce
     assert sent(link) == []
 
 
-def test_another_request_does_as_well_as_a_follow_up() -> None:
+def test_any_other_request_serves_as_a_follow_up() -> None:
     link = MspLink(115200, [], 0.0)
     link.any_byte = True
     link.send(Send(request(100, b"#"), 100, 13), 0.0)

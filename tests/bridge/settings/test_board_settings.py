@@ -21,7 +21,7 @@ ROUND_S = 75.0
 
 
 @pytest.mark.parametrize("name", BOARDS)
-def test_all_settings_are_read_one_is_changed_and_survives_only_a_save(name: str) -> None:
+def test_settings_are_read_and_a_change_survives_only_a_save(name: str) -> None:
     board = BOARDS[name]
     world, client = ready(board)
     table = client.wait_read()

@@ -340,7 +340,7 @@ def test_a_value_that_real32_rounds_is_not_written_back() -> None:
     assert client.value("LED_Pattern1") == 16777217
 
 
-def test_armed_a_setting_is_refused() -> None:
+def test_settings_are_refused_while_armed() -> None:
     world, station = settled_world()
     world.faults.armed = True
     world.run(1)

@@ -145,7 +145,7 @@ def test_assumed_values_are_listed(tmp_path: Path, files: dict[str, Path]) -> No
     }
 
 
-def test_with_home_given_a_list_without_it_keeps_the_first_item(tmp_path: Path) -> None:
+def test_a_list_without_home_keeps_the_first_item_if_home_is_given(tmp_path: Path) -> None:
     """Item 0 in a relative frame, or a TAKEOFF; the jump's target moves along."""
     place = ["--json", "--kind", "inav", "--home", "45.3838,8.4733"]
     away = [replace(POINT, seq=seq, p2=0.0, lat_e7=453839000 + 2000 * seq) for seq in range(3)]
@@ -185,7 +185,7 @@ def test_the_examples_have_the_intended_results() -> None:
 
 
 @pytest.mark.parametrize(("kind", "stored", "findings"), [("harakiri", 2, 1), ("inav", 3, 0), ("multiwii", 2, 1)])
-def test_each_kind_of_flight_controller_has_a_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
+def test_each_kind_of_flight_controller_has_rules(tmp_path: Path, kind: str, stored: int, findings: int) -> None:
     home, point = (replace(item, p2=2.0 if kind == "harakiri" else 0.0) for item in (HOME, POINT))
     file = tmp_path / "speed.waypoints"
     file.write_text(write_qgc_wpl([home, SPEED, replace(point, seq=2)]))

@@ -119,7 +119,7 @@ def test_refuses_changes_while_armed(version: str) -> None:
 
 
 @pytest.mark.parametrize("moment", [0.05, 0.2, 0.5, 0.7, 0.75, 0.8, 0.85])
-def test_arming_at_any_moment_does_not_fly_a_half_list(moment: float) -> None:
+def test_arming_at_any_moment_never_flies_half_a_list(moment: float) -> None:
     board, world, station = board_with()
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(100, 1))

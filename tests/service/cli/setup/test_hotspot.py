@@ -201,7 +201,7 @@ def test_phones_that_join_are_offered_the_page(pi: FaultyMachine) -> None:
     assert step.changes[0].describe() == f"remove {CAPTIVE_FILE}"
 
 
-def test_without_a_hotspot_no_phone_is_offered_the_page(tmp_path: Path) -> None:
+def test_phones_are_offered_the_page_only_on_the_hotspot(tmp_path: Path) -> None:
     assert list(captive_steps(FaultyMachine(tmp_path / "other"), None, has_page=True)) == []
 
 
