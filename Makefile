@@ -11,7 +11,8 @@
 #   make real-board IMAGE=X.elf  run Harakiri with the patch, built by you, on the emulated board (CUTS=20: fewer power cuts;
 #                       FLY=1: flights too)
 #   make soak           kill -9 and damaged stores by the hundred, networks of 50 daemons cut, every power cut of the flash,
-#                       then the daemon under events and attacks for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
+#                       random searches with 8 times the seeds (tests/support/seeds.py), then the daemon under events and
+#                       attacks for 30 min (MINUTES=10: for ten; SOAK_SEED=7: others)
 #   make fuzz           10,500,000 random inputs over UDP, TCP and UART and in files, then each search of the tests with
 #                       1,000 examples instead of 40: hours (EXAMPLES=500: a 26th of the inputs)
 #   make deb            build the Debian packages for amd64, arm64 and armhf in dist/ (ARCH=arm64: only that one)
@@ -96,6 +97,7 @@ soak: $(VENV)/.test-ready
 	STORE_KILLS=200 STORE_DAMAGES=300 $(BIN)/python -m pytest --timeout 0 \
 	    tests/storage/test_store_durability.py tests/storage/test_salvage.py
 	UPLOADS=200 $(BIN)/python -m pytest --timeout 0 tests/scenarios/test_qgc_uploads.py
+	SEEDS=8 $(BIN)/python -m pytest --timeout 0 --numprocesses $(JOBS) tests/bridge tests/protocols
 	FLEET_DAEMONS=50 FLEET_CUTS=5 $(BIN)/python -m pytest tests/fleet/test_fleet_soak.py
 	$(MAKE) -C firmware test
 	SOAK_MINUTES=$(or $(MINUTES),30) $(BIN)/python -m pytest tests/e2e/test_soak.py $(ARGS)

@@ -22,11 +22,8 @@ def make(*arguments: str) -> str:
     return printed
 
 
-# Each pair of compiler, standard and word size once, with some of the power cuts. `make soak` makes all cuts in all
-# eight builds.
-@pytest.mark.parametrize(
-    ("build", "cut_step"), [("gcc-c99-64", 5), ("gcc-c11-32", 17), ("clang-c99-32", 23), ("clang-c11-64", 29)]
-)
+# Each compiler, standard and word size once, with some of the power cuts. `make soak` has all cuts in all eight builds.
+@pytest.mark.parametrize(("build", "cut_step"), [("gcc-c99-64", 5), ("clang-c11-32", 17)])
 def test_core_survives_power_cuts_under_sanitizers(build: str, cut_step: int) -> None:
     flights = 300 // cut_step
     printed = make(build, f"CUT_STEP={cut_step}", f"TEST_FLIGHTS={flights}")
@@ -47,10 +44,6 @@ def test_core_passes_the_tests_on_an_emulated_cortex_m3() -> None:
     assert re.search(r"\d+ checks passed", printed)
 
 
-def test_random_missions_are_flown_as_the_manual_says() -> None:
-    assert "300 lists flown" in make("flights", "FLIGHTS=300")
-
-
 _RULES = {
     "none": "",
     "fixed": "{} s",
@@ -62,12 +55,8 @@ _RULES = {
 }
 
 
-def test_the_manuals_table_of_flight_states_is_the_cores(tmp_path: Path) -> None:
-    sources = [FIRMWARE / name for name in ("naze_flight.c", "naze_steer.c", "naze_slots.c", "tests/test_flight.c")]
-    command = ["gcc", "-std=c99", f"-I{FIRMWARE}", *map(str, sources), "-lm", "-o", str(tmp_path / "states")]
-    subprocess.run(command, check=True)
-    printed = subprocess.run([tmp_path / "states", "--states"], check=True, capture_output=True, text=True).stdout
-    rows = [line.split("|") for line in printed.splitlines()]
+def test_the_manuals_table_of_flight_states_is_the_cores() -> None:
+    rows = [line.split("|") for line in make("flights", "FLIGHTS=--states").splitlines()]
     expected = []
     for name, mode, rule, seconds, then, reason in rows:
         lasting = rule == "none"
@@ -92,7 +81,7 @@ def test_core_stays_small() -> None:
 
 
 def test_fuzzer_finds_no_fault_in_a_few_seconds() -> None:
-    assert "stat::number_of_executed_units" in make("fuzz", "FUZZ_SECONDS=2")
+    assert "stat::number_of_executed_units" in make("fuzz", "FUZZ_SECONDS=1")
 
 
 @pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])

@@ -4,6 +4,7 @@
 import ctypes
 import subprocess
 from ctypes import POINTER, c_bool, c_int, c_uint8, c_uint16, c_uint32, c_void_p
+from fcntl import LOCK_EX, flock
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from simulator.naze.compiled_core import open_library
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
 _BUFFER_SIZE = 243
-_FRAME_SIZE = _BUFFER_SIZE + 6
 _CAPACITY = 146
 _NO_COMMAND, _POWER_CUT = -1, -2
 
@@ -24,8 +24,6 @@ _SIGNATURES = {
     "sim_cut_at": (None, [c_void_p, c_uint32, c_int]),
     "sim_fail_at": (None, [c_void_p, c_uint32, c_int]),
     "sim_request": (c_int, [c_void_p, c_uint8, POINTER(c_uint8), c_uint8]),
-    "sim_receive": (c_int, [c_void_p, c_uint8, POINTER(c_uint8)]),
-    "sim_store": (c_int, [c_void_p, POINTER(c_uint8), c_uint16]),
     "sim_advance": (None, [c_void_p, c_uint32]),
     "sim_arm": (None, [c_void_p, c_bool]),
     "sim_set_write_pending": (None, [c_void_p, c_bool]),
@@ -42,8 +40,10 @@ class PowerCut(Exception):
 
 @cache
 def library() -> Path:
-    """Build the shared library of the core and its board in memory."""
-    subprocess.run(["make", "-s", "-C", FIRMWARE, "sim"], check=True)
+    """Build the shared library of the core and its board in memory, once for all workers."""
+    with (FIRMWARE / "Makefile").open() as lock:
+        flock(lock, LOCK_EX)
+        subprocess.run(["make", "-s", "-C", FIRMWARE, "sim"], check=True)
     return FIRMWARE / "build" / "libnaze_mission.so"
 
 
@@ -69,25 +69,6 @@ class CCore:
         if length == _POWER_CUT:
             raise PowerCut
         return None if length == _NO_COMMAND else bytes(buffer[:length])
-
-    def receive(self, data: bytes) -> bytes:
-        """Receive bytes like the patched firmware's receiver; return the reply frames. PowerCut."""
-        reply = (c_uint8 * _FRAME_SIZE)()
-        replies = bytearray()
-        for byte in data:
-            length = self._c.sim_receive(self._board, byte, reply)
-            if length == _POWER_CUT:
-                raise PowerCut
-            replies += bytes(reply[:length])
-        return bytes(replies)
-
-    def store(self, records: bytes) -> int:
-        """Let the firmware save one of its own lists; return the status. PowerCut."""
-        buffer = (c_uint8 * max(len(records), 1))(*records)
-        status = int(self._c.sim_store(self._board, buffer, len(records) // RECORD_SIZE))
-        if status == _POWER_CUT:
-            raise PowerCut
-        return status
 
     def advance(self, milliseconds: int) -> None:
         self._c.sim_advance(self._board, milliseconds)

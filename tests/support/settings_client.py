@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from bridge.fc.fc_settings import Cause, SettingRefusal
 from bridge.model.settings import BoardSetting, SettingTable, Value
 from bridge.settings.setting_work import Answer
-from protocols.msp.frame import MspParser
 from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import BOXES
@@ -116,7 +115,7 @@ def cause_of(result: object) -> Cause:
 
 
 def asked(world: World, command: int, since: float = 0.0) -> int:
-    frames = (frame for at, _, data in world.written if at >= since for frame in MspParser().feed(data))
+    frames = world.requests(since)
     return sum(frame.command == command for frame in frames)
 
 

@@ -304,6 +304,10 @@ class World:
         self._flush()  # for tests that call the bridge themselves
         return [event for event in self.log_event if event.name == name]
 
+    def requests(self, since: float = 0.0) -> list[MspFrame]:
+        """The MSP frames that were written to the flight controller since then, as far as `written` has them."""
+        return [frame for at, _, data in self.written if at >= since for frame in MspParser().feed(data)]
+
     def take_published(self) -> set[Group]:
         """The watched groups with new values since the last call."""
         published, self._published = self._published, set()

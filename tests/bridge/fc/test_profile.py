@@ -19,6 +19,7 @@ from simulator.board.options import SimOptions, TelemetryProtocol
 from simulator.naze.firmware import Protocol
 from tests.support.conversations import Upload, waypoints
 from tests.support.fake_inav import FakeInav
+from tests.support.seeds import seeds
 from tests.support.world import GroundStation, World
 
 
@@ -52,7 +53,6 @@ def test_a_new_flight_controller_needs_only_a_profile() -> None:
 #: Counted from when the board can be heard again.
 FOUND_WITHIN_S = 8.0
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
-MOMENTS = 12
 
 
 def begun(baud: int, protocol: TelemetryProtocol) -> World:
@@ -84,7 +84,7 @@ def is_known(world: World) -> bool:
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
 @pytest.mark.parametrize("protocol", TelemetryProtocol)
 def test_a_board_that_arms_and_disarms_is_found_again(baud: int, protocol: TelemetryProtocol) -> None:
-    for seed in range(MOMENTS):
+    for seed in seeds(3):
         world = identifying(baud, seed, protocol)
         world.faults.armed = True
         if (baud, protocol) != (1200, TelemetryProtocol.MAVLINK):

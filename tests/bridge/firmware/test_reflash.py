@@ -80,7 +80,7 @@ def session_bytes() -> tuple[int, int]:
 def test_an_interrupted_flash_resumes_and_never_starts_half_a_program() -> None:
     read, total = session_bytes()
     dice = random.Random(2)
-    for cut in sorted((dice.randrange(read), *dice.sample(range(read, total), 8))):
+    for cut in sorted((dice.randrange(read), *dice.sample(range(read, total), 3))):
         board = board_in_boot_loader(cut)
         before = board.flash_contents
         bench = DialogueBench(board)

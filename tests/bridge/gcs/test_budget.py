@@ -8,8 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.budget import Budget, Budgets, Cost
-from protocols.msp.frame import MspParser
-from tests.support.world import GroundStation, World, ready_world
+from tests.support.world import GroundStation, ready_world
 
 
 def spent(budget: Budget, cost: Cost, now: float = 0.0, *, is_proven: bool = False) -> int:
@@ -68,12 +67,6 @@ def test_one_stranger_leaves_half_of_the_flash_writes_to_others() -> None:
     assert spent(budgets.of("pilot"), Cost.FLASH) == 200
 
 
-def writes_left(world: World, station: GroundStation) -> int:
-    found = world.inside.ground.station(station.peer)
-    assert found is not None
-    return sum(found.allows(Cost.FLASH) for _ in range(500))
-
-
 def test_a_flood_of_counts_is_not_logged() -> None:
     world = ready_world()
     station = GroundStation(world)
@@ -104,9 +97,9 @@ def test_strangers_requests_do_not_reach_an_armed_board() -> None:
     )
 
     def requests(seconds: float) -> Counter[int]:
-        before = len(world.written)
+        world.written.clear()
         world.run(seconds)
-        return Counter(frame.command for _, _, data in world.written[before:] for frame in MspParser().feed(data))
+        return Counter(frame.command for frame in world.requests())
 
     def ask_all() -> None:
         for message in asked:

@@ -36,20 +36,20 @@ def disconnect(world: World, peer: Peer) -> None:
 
 
 @pytest.mark.parametrize("leave", [fall_silent, disconnect])
-def test_hundreds_of_stations_that_have_left_are_forgotten(leave: Callable[[World, Peer], None]) -> None:
+def test_stations_that_have_left_are_forgotten(leave: Callable[[World, Peer], None]) -> None:
     world = ready_world()
     gc.collect()
     before = [each for each in gc.get_objects() if type(each) in (GcsStation, Peer)]
     speaker = GroundStation(world)
     del world.stations[speaker.peer]
     data = b"".join(map(speaker.pack, REQUESTS))
-    for number in range(200):
-        peer = Peer("udp", (f"10.0.{number // 250}.{number % 250}", 14550))
+    for number in range(40):
+        peer = Peer("udp", (f"10.0.0.{number}", 14550))
         world.bridge.gcs_received(peer, data, world.now, datagram=True)
         world.bridge.gcs_received(peer, data, world.now, datagram=True)
         world.run(0.1)
         leave(world, peer)
-    assert len(world.events("gcs.found")) == 200
+    assert len(world.events("gcs.found")) == 40
     # An upload ends after 5 s without an item, and a download after 20 s.
     world.run(85)
     world.log_event.clear()

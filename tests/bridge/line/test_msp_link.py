@@ -13,6 +13,7 @@ from protocols.msp.commands import Msp
 from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, request
 from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import Download, records_of, waypoints
+from tests.support.seeds import seeds
 from tests.support.world import GroundStation, World, flash_holding
 
 #: Bytes of its send ring, and of the heartbeat that may join them.
@@ -43,7 +44,7 @@ def sent(link: MspLink) -> list[int]:
 @pytest.mark.parametrize("stall_ms", [150.0, 300.0])
 def test_a_download_during_a_configuration_write_is_complete(stall_ms: float) -> None:
     """Mission Planner sets the radius after a Write; the board stalls a second later, perhaps during a Read."""
-    for seed in range(8):
+    for seed in seeds(3):
         draw = random.Random(seed)
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
         world = World(options, speeds=(115200,), flash=FULL_FLASH)
@@ -78,7 +79,7 @@ def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
 @pytest.mark.parametrize("rate", [1e-3, 1e-2])
 def test_lost_bytes_do_not_overflow_the_ring(rate: float, extension: bool) -> None:
     """Truncated frames, repeats, and padding for a parser without a timeout."""
-    for seed in range(4):
+    for seed in seeds(2):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=rate, extension=extension), speeds=(115200,))
         world.run(20)
         world.assert_line_was_clean()
@@ -86,8 +87,8 @@ def test_lost_bytes_do_not_overflow_the_ring(rate: float, extension: bool) -> No
             assert any(RESYNC in data for _, _, data in world.written)
 
 
-@pytest.mark.parametrize("hang_s", [0.3, 1.0, 1.6, 2.0, 2.4, 2.8])
-@pytest.mark.parametrize("baud", [115200, 9600, 1200])
+@pytest.mark.parametrize("hang_s", [0.3, 1.6, 2.4])
+@pytest.mark.parametrize("baud", [115200, 1200])
 @pytest.mark.parametrize("extension", [True, False])
 def test_the_backlog_of_a_stalled_board_fits_the_ring(hang_s: float, baud: int, extension: bool) -> None:
     """It answers everything at once when it resumes: requests, repeats and the probes of the new search."""

@@ -8,7 +8,6 @@ from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.list_check import check_list
 from bridge.model.missions import ArrivedMission, Outcome
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.frame import MspParser
 from protocols.msp.mission import MissionCommand
 from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, ack_message, records_of, waypoints
@@ -21,9 +20,7 @@ KEPT = "Mission did not arrive: write it again"
 
 
 def is_committing(world: World) -> bool:
-    return any(
-        frame.command == MissionCommand.COMMIT for _, _, data in world.written for frame in MspParser().feed(data)
-    )
+    return any(frame.command == MissionCommand.COMMIT for frame in world.requests())
 
 
 @pytest.mark.parametrize("boot_ms", [7100, 25200])

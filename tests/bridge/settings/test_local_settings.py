@@ -18,7 +18,6 @@ from bridge.settings.local_settings import (
     by_setting,
     plan_restore,
 )
-from protocols.msp.frame import MspParser
 from protocols.param_file import is_equal
 from simulator.board.options import Faults
 from tests.support.settings_client import BOARDS, ready, restart, value_of
@@ -60,8 +59,7 @@ def values(table: SettingTable | SettingRefusal) -> dict[str, Value]:
 
 def writes(world: World) -> int:
     """Saves and changes that were sent to the board."""
-    frames = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
-    return sum(command in (EEPROM_WRITE, SET_SETTING) for command in frames)
+    return sum(frame.command in (EEPROM_WRITE, SET_SETTING) for frame in world.requests())
 
 
 @pytest.mark.parametrize("name", CHANGES)

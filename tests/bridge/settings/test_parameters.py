@@ -169,15 +169,7 @@ def test_an_unchanged_value_is_not_written(value: float) -> None:
     assert world.naze.flash_operations == operations
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 2001.0, 1e30])
-def test_a_value_out_of_range_is_refused_with_a_text(value: float) -> None:
-    world, station = radius_world()
-    received = answers((world, station), param_set(b"WPNAV_RADIUS", value))
-    assert values(received) == [("WPNAV_RADIUS", 200.0, OWN - 1)]
-    assert station.texts() == ["WPNAV_RADIUS stays 200: 0..2000 cm"]
-
-
-@pytest.mark.parametrize("value", [0.0, 1.0, 13.0, 35.0, 82.0, 209.99998, 2000.0])
+@pytest.mark.parametrize("value", [0.0, 13.0, 209.99998, 2000.0])
 def test_every_radius_in_range_is_set(value: float) -> None:
     world, station = radius_world()
     station.send(param_set(b"WPNAV_RADIUS", value))
@@ -197,14 +189,6 @@ def test_a_parameter_that_cannot_be_set_is_answered_with_the_value() -> None:
     (missing,) = answers((world, station), param_set(b"NO_SUCH_NAME", 7.0))
     assert (missing.get_type(), missing.param_id) == ("PARAM_ERROR", "NO_SUCH_NAME")
     assert missing.error == m.MAV_PARAM_ERROR_DOES_NOT_EXIST
-
-
-def test_a_board_that_does_not_answer_is_reported() -> None:
-    world, station = radius_world()
-    world.faults.hang = True
-    station.send(param_set(b"WPNAV_RADIUS", 400.0))
-    world.wait_until(lambda _: bool(station.texts()), 5)
-    assert station.texts()[0] == NO_ANSWER.text
 
 
 def test_a_change_just_before_arming_is_not_reported_as_unchanged() -> None:
@@ -246,7 +230,7 @@ def test_repeated_sets_are_done_one_at_a_time() -> None:
     world.assert_line_was_clean()
 
 
-@pytest.mark.parametrize("hang_s", [0.1, 0.2, 0.3, 0.5, 0.8])
+@pytest.mark.parametrize("hang_s", [0.1, 0.3, 0.8])
 def test_a_late_reply_to_the_first_change_does_not_confirm_the_second(hang_s: float) -> None:
     """The board hangs after the first PARAM_SET and answers both when it resumes."""
     world, station = radius_world()
@@ -304,6 +288,8 @@ def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
         (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
         (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "GBL_FLG stays 1: a running Harakiri can crash"),
         (b"LED_Pattern1", 2.0**24, 1300.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "only up to 16777215 over"),
+        (b"WPNAV_RADIUS", 2001.0, 200.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "WPNAV_RADIUS stays 200: 0..2000 cm"),
+        (b"WPNAV_RADIUS", math.nan, 200.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "WPNAV_RADIUS stays 200: 0..2000"),
     ],
 )
 def test_a_refused_value_is_answered_with_the_reason_and_the_value_in_force(
@@ -338,15 +324,6 @@ def test_a_value_that_real32_rounds_is_not_written_back() -> None:
     received = reply_to(world, station, b"LED_Pattern1", 16777216.0)
     assert {(each.get_type(), each.param_value) for each in received} == {("PARAM_VALUE", 16777216.0)}
     assert client.value("LED_Pattern1") == 16777217
-
-
-def test_settings_are_refused_while_armed() -> None:
-    world, station = settled_world()
-    world.faults.armed = True
-    world.run(1)
-    received = reply_to(world, station, b"P_ROLL", 44.0)
-    assert (received[-1].param_id, received[-1].param_value) == ("P_ROLL", 35.0)
-    assert "disarm" in " ".join(station.texts())
 
 
 def command_of_storage(what: float) -> Message:
@@ -409,15 +386,6 @@ def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> N
     station.send(command_of_storage(1))
     world.run(1)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
-    world.faults.armed = False
-    world.run(1)
-    for what in (0, 2, 3):
-        world.run(1)
-        station.take()
-        station.send(command_of_storage(what))
-        world.run(1)
-        assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
-        assert station.texts() == ["Settings can be saved, but not loaded or reset"]
 
 
 def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:
@@ -426,6 +394,15 @@ def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:
     station = GroundStation(world)
     received = parameter_list(world, station)
     assert {each.param_count for each in received} == {ALL}
+
+
+def test_a_setting_requested_before_the_settings_are_read_is_answered_then() -> None:
+    world = World(speeds=(115200,))
+    world.wait_until(lambda world: world.is_found, 20)
+    station = GroundStation(world)
+    station.send(m.MAVLink_param_request_read_message(1, 1, b"P_ROLL", -1))
+    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 10)
+    assert station.messages("PARAM_VALUE")[0].param_id == "P_ROLL"
 
 
 def test_a_station_with_a_shorter_list_gets_the_whole_list_later() -> None:
@@ -499,8 +476,11 @@ _REFUSALS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["harakiri", "inav", "multiwii"])
-@pytest.mark.parametrize("reason", _REFUSALS)
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [*(("harakiri", reason) for reason in _REFUSALS)]
+    + [(kind, reason) for kind in ("inav", "multiwii") for reason in ("too high", "armed", "without an answer")],
+)
 def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str) -> None:
     """QGroundControl repeats it without, and MAVSDK waits."""
     faults = Faults(boxes=0)

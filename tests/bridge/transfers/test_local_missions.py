@@ -27,6 +27,7 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     world.wait_until(lambda _: bool(outcome), 2)
     world.run(0.1)
     assert requested(station) == [0]
+    assert any(text.startswith("test: ") for text in station.texts())
     for seq, item in enumerate(waypoints(5)):
         station.send(item_message(seq, item))
     world.run(0.02)

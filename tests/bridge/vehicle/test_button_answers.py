@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
+from protocols.float32 import single
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionItem, MissionResult
 from simulator.commands.fc_kinds import make_board
@@ -162,14 +163,15 @@ def test_reading_a_missing_mission_returns_an_empty_list_and_the_reason(kind: st
 
 
 def test_resume_mission_names_the_way_back() -> None:
-    """Mission Planner writes home, a TAKEOFF and the rest of the list."""
+    """Mission Planner writes home, a TAKEOFF and the rest of the list as it read them, in single precision."""
     world, station = connected()
     items = waypoints(9)
     assert Upload(station, items).run() is MissionResult.ACCEPTED
     world.run(5)
     read = Download(station).run()
     takeoff = replace(read[1], seq=1, command=Command.NAV_TAKEOFF, lat_e7=0, lon_e7=0, alt_m=10.0)
-    resumed: list[MissionItem] = [read[0], takeoff, *(replace(item, seq=n) for n, item in enumerate(read[5:], 2))]
+    rest = [replace(item, lat_e7=round(single((item.lat_e7 or 0) / 1e7) * 1e7)) for item in read[5:]]
+    resumed: list[MissionItem] = [read[0], takeoff, *(replace(item, seq=n) for n, item in enumerate(rest, 2))]
     station.take()
     assert Upload(station, resumed).run() is MissionResult.ACCEPTED
     assert any("missions restore" in text for text in station.texts())

@@ -32,15 +32,11 @@ class CalibrationPages:
         self.world = World(SimOptions(), faults, speeds=(115200,), peer=peer)
         self.world.wait_ready()
         self.station = GroundStation(self.world)
-        self._beat()
+        self.station.stay_connected()
         self.world.run(4)
         self.screens = Screens(self.station)
         self.began_at = self.world.now
         self.station.take()
-
-    def _beat(self) -> None:
-        self.station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, 8, 0, 0, 0, 3))
-        self.world.after(1.0, self._beat)
 
     def command(self, number: int, *params: float) -> None:
         self.station.send(m.MAVLink_command_long_message(1, 1, number, 0, *params, *[0] * (7 - len(params))))

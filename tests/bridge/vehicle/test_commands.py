@@ -138,13 +138,6 @@ def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
     assert not world.naze.armed
 
 
-def test_a_mode_change_is_refused_with_a_text(flying: tuple[World, GroundStation]) -> None:
-    flying[0].run(_SILENCE_S)
-    received = answers(flying, m.MAVLink_set_mode_message(1, 1, 4))
-    assert [message.get_type() for message in received if message.get_type() != "PING"] == ["STATUSTEXT"]
-    assert "transmitter switches" in received[0].text
-
-
 @pytest.mark.parametrize(
     "refused",
     [

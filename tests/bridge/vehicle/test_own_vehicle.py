@@ -72,21 +72,6 @@ def test_a_heartbeat_is_sent_with_a_poll() -> None:
     assert polled.issuperset(round(at, 2) for at in times)
 
 
-def test_a_disarmed_craft_is_on_the_ground() -> None:
-    world, station = flown(3)
-    assert station.take("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_IN_AIR
-    world.faults.armed = False
-    world.run(3)
-    assert station.messages("EXTENDED_SYS_STATE")[-1].landed_state == m.MAV_LANDED_STATE_ON_GROUND
-
-
-def test_home_is_the_place_and_altitude_of_arming() -> None:
-    _, station = flown(30)
-    home = station.messages("HOME_POSITION")[-1]
-    assert (home.latitude, home.longitude) == (453838000, 84733000)
-    assert home.altitude == pytest.approx(131_000, abs=1000)
-
-
 @pytest.mark.parametrize("tree", Tree)
 def test_home_before_arming_is_the_position(tree: Tree) -> None:
     """HarakiriWebstore1 reports an unknown home as 190 degrees, TestCode3 as 0."""

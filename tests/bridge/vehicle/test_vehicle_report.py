@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The vehicle's published groups, the same for every protocol of the flight controller."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from reports.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from simulator.board.options import SimOptions, TelemetryProtocol
 from tests.bridge.fc.states.test_pass_through import passing
-from tests.support.world import GroundStation, World
+from tests.support.world import World
 
 EMPTY: dict[Group, Any] = {
     Group.ATTITUDE: Attitude(),
@@ -26,39 +25,6 @@ EMPTY: dict[Group, Any] = {
 
 def without_age(group: Any) -> Any:
     return replace(group, age_s=None)
-
-
-def last(station: GroundStation, kind: str) -> Any:
-    return station.messages(kind)[-1]
-
-
-def test_groups_have_the_values_sent_to_ground_stations() -> None:
-    world = World()
-    station = GroundStation(world)
-    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    world.wait_ready()
-    world.run(5.0)
-    report = world.bridge.report(world.now)
-    attitude, position = last(station, "ATTITUDE"), last(station, "GLOBAL_POSITION_INT")
-    assert report.attitude.pitch_deg == pytest.approx(math.degrees(attitude.pitch), abs=1e-4)
-    assert report.attitude.roll_deg == pytest.approx(math.degrees(attitude.roll), abs=1e-4)
-    assert report.attitude.heading_deg == pytest.approx(math.degrees(attitude.yaw) % 360, abs=1e-4)
-    assert report.position.lat_deg == position.lat / 1e7
-    assert report.position.lon_deg == position.lon / 1e7
-    assert report.position.altitude_m == position.alt / 1000
-    assert report.position.height_m == pytest.approx(position.relative_alt / 1000)
-    gps, battery, rc = last(station, "GPS_RAW_INT"), last(station, "SYS_STATUS"), last(station, "RC_CHANNELS")
-    assert (report.gps.fix, report.gps.satellites, report.gps.hdop) == ("3D", gps.satellites_visible, None)
-    assert report.battery.voltage_v == battery.voltage_battery / 1000
-    assert report.battery.current_a is None
-    assert report.rc.channels_us is not None
-    assert report.rc.channels_us[:4] == (rc.chan1_raw, rc.chan2_raw, rc.chan3_raw, rc.chan4_raw)
-    assert report.rc.rssi_percent == pytest.approx(rc.rssi / 254 * 100, abs=0.5)
-    assert (report.status.armed, report.status.mode) == (False, "STABILIZE")
-    assert report.status.sensors == ("accelerometer", "barometer", "compass", "gps")
-    assert (report.link.state, report.link.ground_stations) == ("MSP", (str(station.peer),))
-    assert report.mission is not None
-    assert report.mission.count == 0
 
 
 def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:

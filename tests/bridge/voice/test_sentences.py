@@ -20,30 +20,24 @@ def longest(name: str) -> Happening:
 
 
 @pytest.mark.parametrize("kind", Kind)
-@pytest.mark.parametrize("name", TABLE)
-def test_every_sentence_fits_a_hud(name: str, kind: Kind) -> None:
-    texts = rendered(longest(name), kind)
-    for severity, text in texts:
-        assert text.isascii()
-        assert len(text) <= 50 or (severity > 4 and not text.startswith("PreArm"))
-        # Values are not cut, except a name in its middle.
-        assert name in FREE or not text.endswith("..")
-    # The HUD keeps the last text, and the Messages tab has each once. QGroundControl has dialogs of its own.
-    severity = longest(name).severity
-    is_banner = kind is Kind.QGROUNDCONTROL and severity is Severity.ERROR
-    is_warning = is_banner or texts[-1][1] == TABLE[name].planner
-    assert texts[-1][0] is (Severity.WARNING if is_warning else severity)
-    assert len(set(texts)) == len(texts)
-
-
-@pytest.mark.parametrize("kind", Kind)
-@pytest.mark.parametrize("name", TABLE)
-def test_sentences_are_shown_completely(name: str, kind: Kind) -> None:
-    """What a HUD's line lacks is in another text."""
-    said = " ".join(text for _, text in rendered(longest(name), kind))
-    missing = [value for value in TABLE[name].longest if isinstance(value, str) and value not in said]
-    # The short list of names stands for the long one.
-    assert missing in ([], [TABLE["SETTINGS_CHANGED"].longest[1]])
+def test_every_sentence_fits_a_hud_and_is_shown_completely(kind: Kind) -> None:
+    for name, sentence in TABLE.items():
+        texts = rendered(longest(name), kind)
+        for severity, text in texts:
+            assert text.isascii(), text
+            assert len(text) <= 50 or (severity > 4 and not text.startswith("PreArm")), text
+            # Values are not cut, except a name in its middle.
+            assert name in FREE or not text.endswith(".."), text
+        # The HUD keeps the last text, and the Messages tab has each once. QGroundControl has dialogs of its own.
+        severity = longest(name).severity
+        is_banner = kind is Kind.QGROUNDCONTROL and severity is Severity.ERROR
+        is_warning = is_banner or texts[-1][1] == sentence.planner
+        assert texts[-1][0] is (Severity.WARNING if is_warning else severity), name
+        assert len(set(texts)) == len(texts), name
+        # Another text has the values that a HUD's line lacks. The short list of names stands for the long one.
+        said = " ".join(text for _, text in texts)
+        missing = [value for value in sentence.longest if isinstance(value, str) and value not in said]
+        assert missing in ([], [TABLE["SETTINGS_CHANGED"].longest[1]]), name
 
 
 def test_only_a_failure_begins_with_prearm_on_other_stations_than_mission_planner() -> None:
@@ -65,21 +59,26 @@ def test_texts_in_the_table_are_unique() -> None:
     assert [text for text, count in texts.items() if count > 1] == []
 
 
-@pytest.mark.parametrize("name", TABLE)
-def test_the_longest_values_are_those_of_the_text(name: str) -> None:
-    sentence = TABLE[name]
-    for text in (sentence.text, sentence.short):
-        fields = [field for _, field, _, _ in Formatter().parse(text) if field is not None]
-        assert all(not field or int(field) < len(sentence.longest) for field in fields)
-        assert "" not in fields or len(fields) == len(sentence.longest)
+def test_the_longest_values_are_those_of_the_text() -> None:
+    for name, sentence in TABLE.items():
+        for text in (sentence.text, sentence.short):
+            fields = [field for _, field, _, _ in Formatter().parse(text) if field is not None]
+            assert all(not field or int(field) < len(sentence.longest) for field in fields), name
+            assert "" not in fields or len(fields) == len(sentence.longest), name
 
 
 @pytest.mark.parametrize("kind", Kind)
 def test_a_long_text_is_whole_again_when_the_pieces_are_joined(kind: Kind) -> None:
     text = "19 items: Delay changed from 3 to 1 (0 = fly through, 1 = brake; to hold use LOITER_TIME) and so on"
-    joined = "".join(pieces(text, kind))
-    assert joined.split() == text.split()
-    assert kind is not Kind.MAVSDK or joined == text
+    for each in (text, "short", "x" * 50, "x" * 51, "word " * 40, "a" * 120 + " b", "y" * 50 + " z", ""):
+        *begun, last = pieces(each, kind)
+        joined = "".join([*begun, last])
+        assert "".join(joined.split()) == "".join(each.split())
+        assert kind is not Kind.MAVSDK or joined == each
+        # A receiver that joins pieces expects another one after a piece of 50 characters.
+        assert {len(piece) for piece in begun} <= {50}
+        assert len(last) <= (49 if begun else 50)
+    assert "".join(pieces(text, kind)).split() == text.split()
 
 
 def test_bad_news_is_worse_than_a_notice() -> None:

@@ -46,7 +46,9 @@ def heard(kind: Kind, happening: Happening, *, answers: bool = False, is_replace
 
 
 def nonce_of(question: Message) -> int:
-    number = question.ts1 if question.get_type() == "TIMESYNC" else question.time_usec
+    is_timesync = question.get_type() == "TIMESYNC"
+    assert not is_timesync or question.tc1 == 0, "another number is an answer"
+    number = question.ts1 if is_timesync else question.time_usec
     assert isinstance(number, int)
     return number
 

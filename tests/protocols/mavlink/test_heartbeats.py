@@ -33,12 +33,10 @@ def test_a_heartbeat_is_recognised(version: int) -> None:
     assert is_plausible_heartbeat(frame(GOOD, version=version))
 
 
-@pytest.mark.parametrize("msgid", [msgid for msgid in MESSAGE_FORMATS if msgid])
-def test_other_messages_are_not_recognised(msgid: int) -> None:
-    """The same bytes in another message, in MAVLink 2 perhaps without its zeros."""
-    assert not is_plausible_heartbeat(frame(GOOD, msgid))
-    if msgid < 256:
-        assert not is_plausible_heartbeat(frame(GOOD, msgid, version=1))
+def test_the_same_bytes_in_another_message_are_not_recognised() -> None:
+    recognised = [msgid for msgid in MESSAGE_FORMATS if is_plausible_heartbeat(frame(GOOD, msgid))]
+    old = [msgid for msgid in range(256) if is_plausible_heartbeat(frame(GOOD, msgid, version=1))]
+    assert recognised == old == [0]
 
 
 @pytest.mark.parametrize("payload", [b"", GOOD[:8], GOOD + b"\0", GOOD[:4]], ids=len)

@@ -29,7 +29,8 @@ def test_an_unlisted_command_counts_as_a_move(command: int) -> None:
 
 @pytest.mark.parametrize(
     ("interval_us", "effect"),
-    [(0, Effect.RATE), (1e6, Effect.RATE), (-1, Effect.SILENCE), (1e7, Effect.SILENCE), (math.nan, Effect.SILENCE)],
+    [(0, Effect.RATE), (1e6, Effect.RATE)]
+    + [(number, Effect.SILENCE) for number in (-1, -0.5, 1e6 + 1, math.inf, -math.inf, math.nan)],
 )
 def test_an_interval_above_one_second_counts_as_silence(interval_us: float, effect: Effect) -> None:
     number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
@@ -39,7 +40,15 @@ def test_an_interval_above_one_second_counts_as_silence(interval_us: float, effe
     )
 
 
-@pytest.mark.parametrize(("current", "effect"), [(0, Effect.CHANGE), (1, Effect.CHANGE), (2, Effect.MOVE)])
+@pytest.mark.parametrize(("rate_hz", "starts"), [(4, 0), (0, 1), (0, 0), (4, 1)])
+def test_a_stream_that_is_stopped_is_silenced(rate_hz: int, starts: int) -> None:
+    effect = effect_of(frame(mavlink.MAVLink_request_data_stream_message(1, 1, 0, rate_hz, starts)))
+    assert effect is (Effect.RATE if rate_hz and starts else Effect.SILENCE)
+
+
+@pytest.mark.parametrize(
+    ("current", "effect"), [(0, Effect.CHANGE), (1, Effect.CHANGE), *((number, Effect.MOVE) for number in (2, 3, 255))]
+)
 def test_a_guided_item_is_not_an_upload(current: int, effect: Effect) -> None:
     item = mavlink.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 1, 0, 0, 0, 0, 0, 0, 0.0)
     assert effect_of(frame(item)) is effect

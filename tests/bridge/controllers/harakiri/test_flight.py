@@ -28,8 +28,8 @@ from tests.support.flight_core import FlightCore
 from tests.support.rule_items import HOME, LAND, LAT, LON, ROI, RTL, TAKEOFF, TIME, TURNS, WAYPOINT, item
 
 FIRMWARE = Path(__file__).parents[4] / "firmware"
-#: 100 m to the north.
-NORTH = 8983
+#: 100 m to the north and to the east.
+NORTH, EAST = 8983, 12788
 
 
 def north(hundreds: float, **fields: Any) -> MissionItem:
@@ -61,6 +61,7 @@ CASES = [
     ((north(6),), (LAT + 5 * NORTH, LON), []),
     # On a desk, 30 km away.
     ((north(1), item(RTL)), (LAT + 300 * NORTH, LON), ["flown only from the list's home, 30.0 km off"]),
+    ((north(1), item(RTL)), (LAT, LON + 300 * EAST), ["flown only from the list's home, 30.0 km off"]),
 ]
 
 

@@ -7,6 +7,7 @@ from bridge.controllers.harakiri import profile as harakiri
 from bridge.model.craft import Airframe
 from simulator.board.options import Faults, SimOptions
 from tests.support.fake_controllers import MspFake, ident
+from tests.support.seeds import seeds
 from tests.support.world import World
 
 
@@ -15,7 +16,7 @@ from tests.support.world import World
 def test_bit_errors_delay_identification_but_never_change_it(rate: float, extension: bool) -> None:
     kind = harakiri.PATCHED if extension else harakiri.UNPATCHED
     found = 0
-    for seed in range(120):
+    for seed in seeds(25):
         faults = Faults(bit_error_rate=rate, extension=extension)
         world = World(SimOptions(seed=seed), faults, speeds=(115200,))
         world.run_until(lambda w: w.kind is not None, 8)
@@ -28,11 +29,11 @@ def test_bit_errors_delay_identification_but_never_change_it(rate: float, extens
         assert controller.airframe is Airframe.QUADROTOR
         if controller.info is not None:
             assert (controller.info.capacity, controller.info.wp_radius_cm) == (146, 200)
-    assert found >= 110
+    assert found >= 22
 
 
 def test_lost_bytes_delay_identification_but_never_change_it() -> None:
-    for seed in range(60):
+    for seed in seeds(15):
         world = World(SimOptions(seed=seed), Faults(lost_byte_rate=3e-3), speeds=(115200,))
         world.wait_until(lambda w: w.kind is not None, 20)
         assert world.kind is harakiri.PATCHED

@@ -7,7 +7,7 @@ from dataclasses import replace
 from hypothesis import event, given
 from hypothesis import strategies as st
 
-from bridge.controllers.harakiri.check import HarakiriCheck, HarakiriRules
+from bridge.controllers.harakiri.check import HarakiriRules
 from bridge.controllers.harakiri.rules import items_from_records
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem
@@ -87,6 +87,7 @@ def test_the_verdict_matches_the_document(
     verdict = check_list(items, profile, home)
     wanted = expected(items, profile.capacity, profile.wp_radius_cm, profile.takeoff_max_m, home)
     event(verdict.result.name)
+    assert all(finding.text().isprintable() for finding in verdict.findings)
     if isinstance(wanted, set):
         assert verdict.result is Result.REJECTED
         assert verdict.ack in wanted
@@ -139,26 +140,6 @@ def changes(verdict: Verdict[WpRecord]) -> list[Finding]:
 def given_value(item: MissionItem, field: str) -> float:
     value: float | None = getattr(item, field)
     return 0 if value is None or math.isnan(value) else value
-
-
-@given(items=lists.filter(lambda items: len(items) > 1))
-def test_item_by_item_and_whole_list_verdicts_agree(items: list[MissionItem]) -> None:
-    profile = HarakiriRules()
-    check = HarakiriCheck(profile, len(items))
-    answers = [check.take(item) for item in items]
-    whole = check_list(items, profile)
-    assert check.finish() == check.finish() == whole
-    rejections = [answer for answer in answers if answer]
-    if rejections:
-        assert whole.findings[-1] == rejections[0].finding
-        assert rejections[0].finding.seq == answers.index(rejections[0])
-
-
-@given(items=lists, profile=profiles)
-def test_findings_are_one_line_each(items: list[MissionItem], profile: HarakiriRules) -> None:
-    for finding in check_list(items, profile).findings:
-        assert finding.text().isprintable()
-        assert finding.text() in finding.text() or finding.text().startswith(finding.text())
 
 
 @given(

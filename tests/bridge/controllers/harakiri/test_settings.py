@@ -5,6 +5,7 @@ from bridge.fc.fc_settings import Cause
 from protocols.msp.setting_table import HeldSetting, SettingCommand, table_checksum
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from simulator.naze.setting_table import SETTINGS as NAZE_SETTINGS
+from tests.support.seeds import seeds
 from tests.support.settings_client import BOARDS, SettingsClient, asked, cause_of, ready, value_of
 from tests.support.world import World
 
@@ -33,7 +34,7 @@ def test_a_change_with_side_effects_is_read_back_completely() -> None:
     assert world.events("settings.changed_on_board") == []
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_a_bad_line_yields_the_right_table_or_none(seed: int) -> None:
     world = World(faults=Faults(bit_error_rate=1e-4), speeds=(115200,), seed=seed)
     table = SettingsClient(world).wait_read(120)

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from bridge.controllers.inav.geozones import FenceRules
+from bridge.controllers.inav.geozones import FenceRules, has_zones
+from bridge.controllers.inav.profile import PROFILE
+from bridge.fc.profile import FlightController
 from bridge.missions.list_check import check_list
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.inav_places import Corner, Geozone
@@ -47,6 +49,11 @@ def test_corners_are_stored_anticlockwise_from_the_first() -> None:
 )
 def test_a_fence_that_does_not_fit_is_rejected(items: list[MissionItem], ack: MissionResult) -> None:
     assert judged(*items).ack is ack
+
+
+@pytest.mark.parametrize(("version", "has"), [((7, 1, 2), False), ((8, 0, 0), True), (None, False)])
+def test_inav_has_zones_since_8(version: tuple[int, int, int] | None, has: bool) -> None:
+    assert has_zones(FlightController(PROFILE, "INAV", version=version)) is has
 
 
 def test_a_return_point_is_dropped_and_named() -> None:

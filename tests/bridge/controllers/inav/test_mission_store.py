@@ -8,28 +8,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.controllers import multiwii
 from bridge.controllers.inav import profile as inav
 from bridge.controllers.inav.limits import InavLimits
-from bridge.controllers.multiwii import multiwii_profile
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
 from protocols.mission_item import MissionItem, MissionResult
-from protocols.msp.frame import MspParser
-from protocols.msp.nav import LAST, Nav, NavAction
+from protocols.msp.nav import Nav
 from simulator.board.msp_board import MspBoard
 from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import BOXES
 from tests.bridge.controllers.nav.test_mission_store import plan
-from tests.support.conversations import Download, Upload, clear_message
+from tests.support.conversations import Download, Upload
+from tests.support.seeds import seeds
 from tests.support.world import GroundStation, World
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
-CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
-NAV_WP_ID = 28
 MIXED = [
     (16, 0),
     (16, 7),
@@ -90,35 +86,7 @@ def test_a_mission_reads_back_as_sent_on_each_version(version: str) -> None:
     assert without_home(Download(station).run()) == without_home(sent)
 
 
-def test_a_multiwii_holds_the_items_it_supports() -> None:
-    board, world, station = board_with("multiwii", capacity=40)
-    assert world.kind is multiwii.PROFILE
-    assert Upload(station, plan(42), tries=60).run() is MissionResult.NO_SPACE
-    assert Upload(station, plan(21), tries=60).run() is ACCEPTED
-    wanted = [r.pack() for r in check_list(plan(21), NavRules(multiwii_profile())).records]
-    assert [record[1:] for record in board.stored_records[:20]] == wanted
-    assert without_home(Download(station).run()) == without_home(plan(21))
-    station.send(clear_message())
-    world.run(2)
-    assert Download(station).run()[1:] == []
-
-
-@pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_refuses_changes_while_armed(version: str) -> None:
-    board, world, station = board_with(version=version)
-    assert Upload(station, plan(10)).run() is ACCEPTED
-    before = board.stored_records
-    board.faults.armed = True
-    world.wait_until(lambda _: board.armed, 5)
-    sent_before = len(world.written)
-    assert Upload(station, plan(20, 1)).run() is DENIED
-    station.send(clear_message())
-    world.run(2)
-    assert not any(data[4] in (Nav.SET_WP, Nav.SAVE) for _, _, data in world.written[sent_before:])
-    assert board.stored_records == before
-
-
-@pytest.mark.parametrize("moment", [0.05, 0.2, 0.5, 0.7, 0.75, 0.8, 0.85])
+@pytest.mark.parametrize("moment", [0.05, 0.5, 0.75, 0.8])
 def test_arming_at_any_moment_never_flies_half_a_list(moment: float) -> None:
     board, world, station = board_with()
     assert Upload(station, plan(10)).run() is ACCEPTED
@@ -134,7 +102,7 @@ def test_arming_at_any_moment_never_flies_half_a_list(moment: float) -> None:
     assert (result is ACCEPTED) <= (read == without_home(plan(100, 1)))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_damaged_bytes_are_free_of_hazards(seed: int) -> None:
     faults = Faults(boxes=0)
     board, world, station = board_with(faults=faults, version="7.1.2", seed=seed)
@@ -156,8 +124,7 @@ def test_a_transfer_takes_little_more_than_the_time_on_the_wire() -> None:
     began = world.now
     while upload.result is None:
         world.run(0.001)
-    sent = [f for at, _, data in world.written if at >= began for f in MspParser().feed(data)]
-    assert [f.command for f in sent].count(Nav.SET_WP) == 120
+    assert [frame.command for frame in world.requests(began)].count(Nav.SET_WP) == 120
     wire_s = 120 * (27 + 6 + 7 + 27) * 10 / 115200
     assert world.now - began <= 1.15 * wire_s
     assert board.counters.rx_overflows == 0
@@ -168,8 +135,7 @@ def test_a_slow_board_gets_each_record_only_once() -> None:
     upload = Upload(station, plan(61))
     assert upload.run() is ACCEPTED
     assert without_home(Download(station).run()) == without_home(plan(61))
-    sent = [frame.command for _, _, data in world.written for frame in MspParser().feed(data)]
-    assert sent.count(Nav.SET_WP) == 60
+    assert [frame.command for frame in world.requests()].count(Nav.SET_WP) == 60
 
 
 def test_polls_to_a_slow_board_are_not_lost() -> None:
@@ -183,22 +149,6 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
         world.run(1)
     assert world.inside.session.state.link.requests_lost == lost
     assert len(station.messages("ATTITUDE")) > 5 * 7
-
-
-def test_mission_progress_is_reported_item_by_item() -> None:
-    board, world, station = board_with()
-    home = world.bridge.vehicle.home
-    assert home is not None
-    legs = [MissionItem(n, 16, 3, 0, 0, 0, 0, home.lat_e7 + 900 * n, home.lon_e7, 10.0) for n in (1, 2, 3)]
-    speed = MissionItem(0, 178, 3, 1, 5, 0, 0, 0, 0, 0)
-    assert Upload(station, [plan(1)[0], legs[0], speed, *legs[1:]]).run() is ACCEPTED
-    board.faults.armed = True
-    world.run(2)
-    board.faults.boxes = 1 << BOXES["9.1.0"].index(NAV_WP_ID)
-    world.run_until(lambda _: any(m.mission_state == 5 for m in station.messages("MISSION_CURRENT")[-1:]), 300)
-    assert [m.seq for m in station.messages("MISSION_ITEM_REACHED")] == [1, 3, 4]
-    current = [m.seq for m in station.messages("MISSION_CURRENT")]
-    assert [seq for n, seq in enumerate(current) if n == 0 or seq != current[n - 1]] == [0, 1, 3, 4]
 
 
 commands = st.sampled_from([16, 16, 16, 17, 18, 19, 20, 21, 80, 115, 177, 177, 177, 178, 197])
@@ -218,7 +168,7 @@ wild = st.builds(
 
 
 @given(st.lists(wild, min_size=2, max_size=10))
-@settings(max_examples=25)
+@settings(max_examples=10)
 def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionItem]) -> None:
     sent = [plan(1)[0], *items]
     if not check_list(sent, NavRules(NavProfile(limits=InavLimits()))).records:
@@ -229,18 +179,6 @@ def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionI
     world.run(2)
     assert board.armed
     assert board.counters.crashes == 0
-
-
-def test_a_stop_during_a_transfer_loads_the_old_list_again() -> None:
-    board, world, station = board_with()
-    assert Upload(station, plan(10)).run() is ACCEPTED
-    upload = Upload(station, plan(100, 1))
-    world.run(0.4)
-    world.bridge.abort(world.now)
-    assert upload.run(2) is DENIED
-    assert any("naze-bridge stopped" in text for text in station.texts())
-    assert without_home(Download(station).run()) == without_home(plan(10))
-    assert board.counters.flash_writes == 1
 
 
 @pytest.mark.parametrize("size", [21, 100, 192])

@@ -24,6 +24,7 @@ from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_wit
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Download, Upload, clear_message
 from tests.support.qgc_upload import FatedLink, QgcStation, QgcUpload
+from tests.support.seeds import seeds
 from tests.support.world import GroundStation, World
 
 FENCE, RALLY, ALL = 1, 2, 255
@@ -68,7 +69,7 @@ def test_a_list_is_written_read_and_survives_a_restart(kind: int, items: list[Mi
     assert Download(station).run()[1:] == []
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_qgroundcontrol_uploads_mission_fence_and_rally_points_over_a_lossy_link(seed: int) -> None:
     """One after the other, as its Upload button does; each list takes only the messages of its own type."""
     _, world, station = board_with()

@@ -30,13 +30,6 @@ def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
     return board, world, station
 
 
-@pytest.mark.parametrize("version", ["7.1.2", "9.1.0"])
-def test_the_version_is_reported(version: str) -> None:
-    _, world, _ = introduced(version=version)
-    assert world.inside.session.state.controller is not None
-    assert world.inside.session.state.controller.version == tuple(map(int, version.split(".")))
-
-
 @pytest.mark.parametrize(
     ("platform", "kind", "by_hand"),
     [

@@ -153,7 +153,7 @@ def test_a_stop_at_a_zone_is_reported_once(action: FenceAction, said: str) -> No
     station.take()
     board.faults.boxes = NAV_WP | ANGLE
     board.faults.armed = True
-    world.run(150)
+    world.run(100)
     texts = [text for text in station.texts() if "geozone" in text]
     assert len(texts) == bool(said)
     assert all(len(text) <= 50 and text == said.format(text.split()[1]) for text in texts)

@@ -180,7 +180,7 @@ def pulled(bench: Bench) -> HeldMission | Refusal:
 
 
 @pytest.mark.parametrize("command", [Msp.STATUS, Nav.GETINFO, Nav.LOAD])
-@pytest.mark.parametrize("lost", [3, 5, 12])
+@pytest.mark.parametrize("lost", [3, 12])
 def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: int) -> None:
     """Until the board has answered and loaded its saved mission, reading fails."""
     bench = Bench(4)
@@ -219,7 +219,7 @@ def test_after_a_read_a_multiwii_still_hovers_at_the_end_of_a_return_home(is_bla
     written = board.counters.flash_writes
     world.run(3)
     board.faults.armed, board.faults.boxes = True, 1 << 7
-    world.run(60)
+    world.run(40)
     craft = board.truth(world.now)
     assert craft is not None
     assert craft.flight.height_m > 5

@@ -17,7 +17,7 @@ from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
 from protocols.msp.frame import Direction, MspFrame, request
 
-MEGABYTE = 1 << 20
+SIZE = 1 << 18
 UNIFORM = bytes(range(256))
 #: Bytes are drawn uniformly from each alphabet; a repeated byte is more likely.
 ALPHABETS = {
@@ -52,19 +52,19 @@ def listen(noise: bytes, search: Searching, chunk: int) -> set[int | None]:
 
 
 @pytest.mark.parametrize("name", ALPHABETS)
-def test_megabytes_of_noise_are_inconclusive(name: str) -> None:
+def test_noise_is_inconclusive(name: str) -> None:
     draw = random.Random(name)
-    noise = bytes(draw.choices(ALPHABETS[name], k=MEGABYTE))
+    noise = bytes(draw.choices(ALPHABETS[name], k=SIZE))
     visited = listen(noise, begin(*SPEEDS), 96)
     assert visited == set(SPEEDS)
     # At one speed throughout: the one that yields the most frames.
-    listen(noise[MEGABYTE // 2 :], begin(115200, good=(115200,)), 512)
+    listen(noise[SIZE // 2 :], begin(115200, good=(115200,)), 512)
 
 
 @pytest.mark.parametrize("preamble", [b"$M>", b"$M!", b"$M<", b"\xfe", b"\xfd", b"\xfe\x09", b"\xfd\x09\x00"])
 def test_noise_full_of_frame_headers_does_not_give_a_verdict(preamble: bytes) -> None:
     draw = random.Random(preamble)
-    noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(60_000))
+    noise = b"".join(preamble + draw.randbytes(draw.randrange(1, 14)) for _ in range(15_000))
     listen(noise, begin(*SPEEDS), 200)
 
 
@@ -92,16 +92,3 @@ def test_a_single_answer_is_not_enough() -> None:
         search.receive(answer.encode(), now)
         search.tick(now)
     assert search.found is None
-
-
-def test_a_heartbeat_must_be_plausible_in_every_field() -> None:
-    mavlink = messages.MAVLink(None, srcSystem=1, srcComponent=1)
-    good = (2, 3, 81, 0, 3, 3)
-    odd = [(250, 3, 81, 0, 3, 3), (2, 99, 81, 0, 3, 3), (2, 3, 81, 0, 77, 3), (2, 3, 81, 0, 3, 2)]
-    for fields, found in [(good, True), *((fields, False) for fields in odd)]:
-        search = begin(115200)
-        frame = bytes(messages.MAVLink_heartbeat_message(*fields).pack(mavlink))
-        search.receive(frame, 0.0)
-        for _ in range(6):
-            search.tick(search.due)
-        assert (search.found is not None) is found

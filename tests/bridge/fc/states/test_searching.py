@@ -18,6 +18,7 @@ from tests.support.fake_controllers import (
     MavlinkOnly,
     QuietLine,
 )
+from tests.support.seeds import seeds
 from tests.support.world import World
 
 ALL_SPEEDS = sorted(set(SPEEDS), reverse=True)
@@ -34,13 +35,15 @@ def reports_armed(world: World) -> bool | None:
 @pytest.mark.parametrize("extension", [True, False])
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
 def test_a_board_is_found_within_seconds_at_every_speed(baud: int, extension: bool) -> None:
-    for seed in range(5):
+    for seed in seeds(2):
         world = World(SimOptions(baud=baud), Faults(extension=extension), plugged=False)
         # A random phase of the board's heartbeat.
         world.run(random.Random(seed).random() * 4)
         world.plug()
-        assert world.wait_until(verdict, 20) <= (1.5 if baud == SPEEDS[0] else 8)
-        world.wait_ready()
+        found_after_s = world.wait_until(verdict, 20)
+        assert found_after_s <= (1.5 if baud == SPEEDS[0] else 8)
+        # At 1200 baud reading the box names twice takes two seconds.
+        assert found_after_s + world.wait_ready() <= (8 if baud >= 2400 else 12)
         assert world.kind is (harakiri.PATCHED if extension else harakiri.UNPATCHED)
         assert world.inside.session.state.speed == baud
         found = world.events("fc.found")
@@ -51,16 +54,10 @@ def test_a_board_is_found_within_seconds_at_every_speed(baud: int, extension: bo
         world.assert_line_was_clean()
 
 
-@pytest.mark.parametrize("baud", [baud for baud in ALL_SPEEDS if baud >= 2400])
-def test_a_board_is_identified_within_8_s(baud: int) -> None:
-    """Except at 1200 baud, where reading the box names twice takes two seconds."""
-    assert World(SimOptions(baud=baud)).wait_ready() <= 8
-
-
 @pytest.mark.parametrize("extension", [True, False])
 def test_a_board_left_in_mid_frame_is_found(extension: bool) -> None:
     frame = request(200, bytes(64))
-    for length in range(1, len(frame)):
+    for length in range(1, len(frame), 5):
         world = World(faults=Faults(extension=extension), plugged=False)
         world.naze.receive(frame[:length], world.now)
         world.run(0.02)
@@ -96,7 +93,7 @@ def test_a_board_that_boots_while_the_port_opens_is_found(boot_ms: float, extens
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
 def test_a_board_is_found_within_3_s_of_the_ports_return(baud: int) -> None:
     draw = random.Random(baud)
-    for _ in range(8):
+    for _ in seeds(3):
         world = World(SimOptions(baud=baud))
         world.wait_until(verdict, 10)
         # The speed may already be known when the port is lost.
@@ -121,20 +118,6 @@ def test_a_board_that_is_armed_from_the_start_is_found(protocol: TelemetryProtoc
     assert "no answer to" in str(world.events("fc.found")[0].facts["why"])
     world.faults.armed = False
     world.wait_until(lambda w: w.kind is harakiri.PATCHED, 8)
-    world.assert_line_was_clean()
-
-
-def test_frsky_telemetry_while_armed_is_ignored() -> None:
-    """The board still answers MSP, at FrSky's speed and between FrSky frames."""
-    world = World(SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600))
-    world.wait_ready()
-    world.faults.armed = True
-    world.wait_until(lambda w: w.inside.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 15)
-    world.run(30)
-    assert world.bridge.vehicle.armed
-    world.faults.armed = False
-    world.wait_until(lambda w: w.inside.session.state.speed == 115200 and w.kind is harakiri.PATCHED, 8)
-    assert {event.facts["protocol"] for event in world.events("fc.found")} == {"MSP"}
     world.assert_line_was_clean()
 
 
