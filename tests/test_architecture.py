@@ -7,6 +7,7 @@ fleet/ needs no daemon on its machine: it shares with service/ only payloads/ an
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from importlib.util import find_spec
 from pathlib import Path
@@ -115,21 +116,23 @@ def imports(folder: Path) -> Iterator[tuple[str, str]]:
                 yield from ((str(file), alias.name) for alias in node.names)
 
 
-def calls(*packages: str) -> Iterator[tuple[str, str, ast.Call]]:
-    """Each call in these packages: the file, the name of the called function or method, and the call."""
-    for package in packages:
-        for file in (REPOSITORY / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute | ast.Name):
-                    name = node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id
-                    yield str(file.relative_to(REPOSITORY)), name, node
+@cache
+def all_calls() -> list[tuple[str, str, ast.Call]]:
+    """Each call in the installed packages: the file, the name of the called function or method, and the call."""
+    found = []
+    for file in (file for package in INSTALLED for file in (REPOSITORY / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute | ast.Name):
+                name = node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id
+                found.append((str(file.relative_to(REPOSITORY)), name, node))
+    return found
 
 
 def test_files_are_read_by_the_bounded_reader() -> None:
     """`storage.small_files`: another reader could wait for a pipe, or read a device until the memory is full."""
     readers = {
         file
-        for file, name, call in calls(*INSTALLED)
+        for file, name, call in all_calls()
         if name in ("read_text", "read_bytes") or (name == "open" and _opens_to_read(call))
     }
     assert readers - OWN_FILES == set()
@@ -144,7 +147,7 @@ def _opens_to_read(call: ast.Call) -> bool:
 
 def test_foreign_bytes_are_decoded_in_one_module() -> None:
     """`protocols.plain_text`, and `file_text` for whole files: text from elsewhere could hold what a terminal obeys."""
-    decoders = {file for file, name, call in calls(*INSTALLED) if name == "decode" and _decodes_bytes(call)}
+    decoders = {file for file, name, call in all_calls() if name == "decode" and _decodes_bytes(call)}
     assert decoders - {"protocols/file_text.py", "protocols/plain_text.py"} == DECODERS.keys()
 
 
@@ -158,7 +161,7 @@ def _decodes_bytes(call: ast.Call) -> bool:
 
 def test_every_sentence_for_pilots_is_in_the_table() -> None:
     """`bridge.voice.sentences`: Ground.say and refusals take only what these make. Others pack a text of theirs."""
-    makers = {(file, name) for file, name, _ in calls("bridge") if name in ("Sentence", "MAVLink_statustext_message")}
+    makers = {(file, name) for file, name, _ in all_calls() if name in ("Sentence", "MAVLink_statustext_message")}
     assert makers == {
         ("bridge/voice/sentences.py", "Sentence"),
         ("bridge/gcs/ground_station.py", "MAVLink_statustext_message"),
@@ -170,7 +173,7 @@ def test_every_sentence_for_pilots_is_in_the_table() -> None:
 def test_the_terminal_gets_text_and_never_markup() -> None:
     """A name such as "[/x]" would end a command, and "[link=...]" would become a link."""
     makers = {"Console", "TextColumn", "from_markup"}
-    made = {(file, name) for file, name, _ in calls(*INSTALLED) if name in makers}
+    made = {(file, name) for file, name, _ in all_calls() if name in makers}
     assert made == {("terminal/printing.py", "Console"), ("terminal/printing.py", "TextColumn")}
     text = (REPOSITORY / "terminal/printing.py").read_text()
     assert "markup=False, emoji=False" in text

@@ -151,7 +151,7 @@ def states(board: Board, world: World, faults: Faults) -> Iterator[str]:
     world.run(10)
     board.is_calibrating = True
     yield "calibrating"
-    world.run(90)
+    world.run(65)
     board.is_calibrating = False
     faults.armed = board.is_armed = True
     world.run(10)
@@ -199,7 +199,7 @@ def test_every_text_matches_the_board_and_the_state(kind: str) -> None:
         seen = len(world.events("gcs.text"))
         for button in buttons():
             station.send(button)
-            world.run(0.3)
+            world.run(0.2)
         Upload(station, waypoints(5)).run()
         world.run(2)
         for event in world.events("gcs.text")[seen:]:
