@@ -28,7 +28,7 @@ _UNUSABLE = 2
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("--image", type=PATH, help="The firmware, unless there is a log.")
+@click.option("--image", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware to fly.")
 @click.option("--log", type=PATH, help="Judge the mission's real flight in this telemetry log instead.")
 @click.option("--flash", type=PATH, help="The flash of your own board (sim --flash). Default: a prepared board.")
 @click.option("--wind", type=click.FloatRange(0, 20), default=0.0, help="Wind with gusts, m/s.")

@@ -68,3 +68,10 @@ def test_an_unknown_lie_is_refused(image: str, lie: str, said: str) -> None:
 
 def test_a_missing_mission_is_refused(image: str) -> None:
     assert run("nowhere.waypoints", "--image", image)[0] == 2
+
+
+def test_a_missing_image_is_named_without_an_error_number(image: str) -> None:
+    code, output = run(FIELD, "--image", f"{image}x")
+    assert code == 2
+    assert f"{image}x" in output.replace("\n", "")
+    assert "Errno" not in output
