@@ -41,6 +41,7 @@ _MAX_BYTES = 1 << 20
 _ARCHITECTURES = ("arm64", "armhf")
 _LINK = "/etc/systemd/system/multi-user.target.wants/naze-bridge-card.service"
 RESULT = "naze-bridge-RESULT.txt"
+_PAGE = f"http://{ADDRESS}:{PAGE_PORT}/"
 #: A package: an ar archive of tar archives (deb(5)).
 _MAGIC = b"!<arch>\n"
 _HEADER_SIZE, _SIZE = 60, slice(48, 58)
@@ -70,6 +71,7 @@ ExecStart=/bin/sh -c '{f"{_FIND.format('first-boot.sh')}; {_CLEAN_UP}".replace("
 UNIT
 mkdir -p {_LINK.rpartition("/")[0]}
 ln -sf {_UNIT} {_LINK}
+sync # the system soon notes that its first start is over
 [ "${{1-}}" != start ] || {{ systemctl daemon-reload; systemctl start --no-block naze-bridge-card; }}
 """
 #: Each step may be cut by the end of the power, and is then repeated. The result is for a person with the card in a PC,
@@ -178,9 +180,8 @@ def card(
     click.echo(f"The card is ready. Put it into the Pi and wait 5 minutes, then join {hotspot!r}.")
     kept_in = boot / FOLDER
     show_secret("Its password", password, f"{kept_in}/password", make_wifi_data(hotspot, password, "WPA"))
-    url = f"http://{ADDRESS}:{PAGE_PORT}/"
-    click.echo(f"Status page: {url}")
-    show_secret("Its token, for changes", token, f"{kept_in}/web-token", f"{url}#token={token}")
+    click.echo(f"Status page: {_PAGE}")
+    show_secret("Its token, for changes", token, f"{kept_in}/web-token", f"{_PAGE}#token={token}")
     if key:
         show_secret("The key, for ground stations that may make changes", key, f"{kept_in}/key", key)
 
@@ -216,8 +217,7 @@ def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: d
 
 
 def _first_boot(ssid: str, options: str) -> str:
-    page = f"http://{ADDRESS}:{PAGE_PORT}/"
-    named = {"connection": CONNECTION, "ssid": shlex.quote(ssid), "page": page, "clean_up": _CLEAN_UP}
+    named = {"connection": CONNECTION, "ssid": shlex.quote(ssid), "page": _PAGE, "clean_up": _CLEAN_UP}
     return _FIRST_BOOT.format(log=_LOG, result=RESULT, options=options, **named)
 
 

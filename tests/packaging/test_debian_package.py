@@ -291,6 +291,9 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     # NetworkManager, whose radio works once there is this file.
     root.put(b"#!/bin/sh\n[ -e /root/radio ] && echo activated\n", "/usr/bin/nmcli")
     root.run("chmod +x /usr/bin/nmcli")
+    # A power cut may follow at once: the unit is then on the card.
+    root.put(b"#!/bin/sh\nls /etc/systemd/system/multi-user.target.wants >/root/synced\n", "/usr/bin/sync")
+    root.run("chmod +x /usr/bin/sync")
     root.run("ln -s private/naze-bridge /var/lib/naze-bridge")  # as DynamicUser= makes it
     root.run("mkdir -p /sys/class/leds/ACT")
 
@@ -300,6 +303,7 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
         (command,) = re.findall(r"- \[(.*)\]", hook.read_text())
         # systemd does not run here to start the unit.
         root.run(command.replace(",", "").removesuffix(" start"))
+    assert "naze-bridge-card" in root.run("cat /root/synced")
     unit = root.run("cat /etc/systemd/system/multi-user.target.wants/naze-bridge-card.service")
     (started,) = re.findall("^ExecStart=(.*)$", unit, re.MULTILINE)
     start = started.replace("$$", "$")
