@@ -169,25 +169,23 @@ def card(
     if key and (weak := weakness(key)) is not None:
         complain("warning: " + Fault.WEAK_KEY.text(why=f"the key {weak}"))
     token = new_token()
-    named = ["--country", country.upper(), *(["--name", name] if name else [])]
     secrets = {"password": password, "web-token": token, **({"key": key} if key else {})}
     try:
-        click.echo(f"Package: {prepare(boot, package, hotspot, named, secrets)}.")
+        click.echo(f"Package: {prepare(boot, package, hotspot, country.upper(), name, secrets)}.")
     except CardError as error:
         fail(error)
     except OSError as error:
         fail(f"{error.filename or boot} cannot be changed: {reason(error)}")
     click.echo(f"The card is ready. Put it into the Pi and wait 5 minutes, then join {hotspot!r}.")
-    kept_in = boot / FOLDER
-    show_secret("Its password", password, f"{kept_in}/password", make_wifi_data(hotspot, password, "WPA"))
+    show_secret("Its password", password, f"{boot / FOLDER}/password", make_wifi_data(hotspot, password, "WPA"))
     click.echo(f"Status page: {_PAGE}")
-    show_secret("Its token, for changes", token, f"{kept_in}/web-token", f"{_PAGE}#token={token}")
+    show_secret("Its token, for changes", token, f"{boot / FOLDER}/web-token", f"{_PAGE}#token={token}")
     if key:
-        show_secret("The key, for ground stations that may make changes", key, f"{kept_in}/key", key)
+        show_secret("The key, for ground stations that may make changes", key, f"{boot / FOLDER}/key", key)
 
 
-def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: dict[str, str]) -> str:
-    """Add the folder and the hook. `options`: more of setup. `secrets`: by file name. It may be repeated.
+def prepare(boot: Path, package: Path, ssid: str, country: str, name: str | None, secrets: dict[str, str]) -> str:
+    """Add the folder and the hook. `name`: the Pi's, if chosen. `secrets`: by file name. It may be repeated.
 
     Returns the checked properties of the package. CardError: this is not a freshly written card, and unchanged.
     """
@@ -196,7 +194,7 @@ def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: d
             f"{boot} is not the boot partition of a Raspberry Pi OS card: it has no cmdline.txt or config.txt"
         )
     checked = _check_package(package, boot)
-    hook = _hooked(boot)
+    hook = _hooked(boot, name)
     folder = boot / FOLDER
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
@@ -205,7 +203,7 @@ def prepare(boot: Path, package: Path, ssid: str, options: list[str], secrets: d
     for file, secret in secrets.items():
         (folder / file).write_text(f"{secret}\n")
     words = (
-        shlex.join([*options, "--hotspot", ssid])
+        shlex.join(["--country", country, *(["--name", name] if name else []), "--hotspot", ssid])
         + ' --password-file "$here/password"'
         + (' --key-file "$here/key"' if "key" in secrets else "")
     )
@@ -273,13 +271,15 @@ def _write(path: Path, text: str) -> None:
     path.write_bytes(text.encode())  # without carriage returns, even on Windows
 
 
-def _hooked(boot: Path) -> tuple[Path, str] | None:
+def _hooked(boot: Path, name: str | None) -> tuple[Path, str] | None:
     """The file for the first start, and the text with our line, or None if the Pi has already begun."""
     user_data, firstrun = boot / "user-data", boot / "firstrun.sh"
     if user_data.exists():
         text = _text(user_data)
         if not text.startswith("#cloud-config"):
             raise CardError(f"{user_data} is not cloud-init's: write the card again")
+        # At each start cloud-init returns to the name that is here.
+        text = re.sub("^hostname:.*", f"hostname: '{name}'", text, flags=re.MULTILINE) if name else text
         return user_data, text if _IN_USER_DATA in text else _with_command(user_data, text)
     if not firstrun.exists() and (boot / FOLDER / "first-boot.sh").exists():
         return None

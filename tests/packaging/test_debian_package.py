@@ -282,7 +282,7 @@ def test_in_a_bare_root_a_card_sets_itself_up_and_does_not_leave_a_secret(
     hook = boot / ("firstrun.sh" if system == "bookworm" else "user-data")
     hook.write_text("#!/bin/bash\nset +e\nexit 0\n" if system == "bookworm" else "#cloud-config\n")
     secrets = {"password": "correct horse", "web-token": "2345-token-6789", "key": "w9rt4-b2npq-8kfhd-zm3sv"}
-    card.prepare(boot, package, "kite", ["--country", "DE"], secrets)
+    card.prepare(boot, package, "kite", "DE", None, secrets)
     packed = tmp_path / "boot.tar"
     with tarfile.open(packed, "w") as archive:
         archive.add(boot, "firmware")

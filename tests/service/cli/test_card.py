@@ -94,11 +94,17 @@ def test_trixies_user_data_gets_a_command(card: Card, more: str, expected: str) 
     assert text.startswith(_USER_DATA)
 
 
+def test_cloud_init_gives_the_pi_the_chosen_name(card: Card) -> None:
+    card.trixie()
+    assert card.prepare("--name", "heron").exit_code == 0
+    assert "\nhostname: 'heron'\nusers:" in (card.boot / "user-data").read_text()
+
+
 @pytest.mark.parametrize("system", [Card.bookworm, Card.trixie])
 def test_it_may_be_prepared_again(card: Card, system: object) -> None:
     assert callable(system)
     system(card)
-    card.prepare("--new-key")
+    card.prepare("--new-key", "--name", "kite")
     hooks = {path.name: path.read_text() for path in card.boot.glob("*") if path.is_file()}
     assert card.prepare("--name", "kite").exit_code == 0
     assert {path.name: path.read_text() for path in card.boot.glob("*") if path.is_file()} == hooks
