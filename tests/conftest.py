@@ -33,6 +33,7 @@ _LONG = (
     "tests/bridge/controllers/harakiri/test_mission_store",
     "tests/e2e/test_soak",
     "tests/service/web/test_page_accessibility",
+    "tests/service/test_loop_budget",
 )
 #: Folders of tests that mostly wait for programs, those with the longest files first.
 _WAITING = tuple(
