@@ -24,7 +24,7 @@ mount -t overlay overlay -o lowerdir=/,upperdir=upper,workdir=work root
 rm -f root/var/lib/man-db/auto-update
 mount -t proc proc root/proc; mount --rbind /dev root/dev; mount --bind upper root/mnt
 mount -t tmpfs none root/run; mount -t tmpfs none root/tmp
-ip link set lo up 2>/dev/null || true
+ip link set lo up
 exec chroot root sh -c 'echo ready; exec cat'
 """
 
