@@ -20,7 +20,7 @@
 #   make release VERSION=0.3.0  cut the changelog, tag, and build everything in dist/0.3.0 with checksums; pushes nothing
 #   make deb-trial      install, use and purge it in a bare Debian with systemd (root; SUITE=trixie: Debian 13;
 #                       SUITE=bookworm-to-trixie: after an upgrade of the system)
-#   make pi-trial       boot it as a Raspberry Pi 3 in QEMU: missions, hotspot, pulls of the plug (root)
+#   make pi-trial       boot it as a Raspberry Pi 3 in QEMU: missions, hotspot, first start, pulls of the plug (root)
 #   make suite-trial    all tests in a bare Debian, as root and as a user (root; SUITE=trixie: Debian 13)
 #   make lock           pin the newest packages that pyproject.toml allows (needs uv)
 #   make cli-page       regenerate docs/cli.md

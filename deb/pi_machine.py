@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Raspberry Pi 3 in QEMU: its card, its UART on the header, its network, and the plug that can be pulled.
 
-QEMU starts a kernel itself, so this program does what a Pi's boot loader does for `dtoverlay=disable-bt`: the header's
-pins belong to the PL011, not to Bluetooth. Kernel and device tree are Debian's.
+QEMU starts a kernel itself, so this program does what a Pi's boot loader does for `enable_uart=1` and
+`dtoverlay=disable-bt`: the header has no UART, the mini-UART, or the PL011 that Bluetooth has otherwise. Kernel and
+device tree are Debian's.
 """
 
 import os
@@ -245,11 +246,16 @@ class Pi:
             run("fdtput", "-r", tree, f"{_PL011}/bluetooth")
         elif "enable_uart=1" not in config:
             run("fdtput", "-t", "s", tree, _MINI_UART, "status", "disabled")
-        words = card.read("cmdline.txt").strip().replace("serial0", "ttyS1" if is_mini else "ttyAMA0")
+        words = card.read("cmdline.txt").strip().replace("serial0", "ttyS0" if is_mini else "ttyAMA0")
         return tree, words, is_mini
 
     def start(self, card: Card) -> None:
         """Plug the Pi in, and wait until it answers over its network."""
+        self.power(card)
+        self.until("true", 1800)
+
+    def power(self, card: Card) -> None:
+        """Plug the Pi in. Its first restart ends it, as a pull of the plug does."""
         self._card = card
         tree, words, is_mini = self._load(card)
         pins, trace = self._folder / "header", self._folder / "trace"
@@ -289,7 +295,9 @@ class Pi:
             time.sleep(0.05)
         self.speeds = []
         _Wire(pins, self._board, trace, self.speeds).start()
-        self.until("true", 1800)
+
+    def is_off(self) -> bool:
+        return self._qemu is None or self._qemu.poll() is not None
 
     def run(self, script: str) -> str:
         """Run a shell script on the Pi; returns its output."""

@@ -37,12 +37,14 @@ from functools import partial
 from http.client import HTTPException
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
 
 from deb.pi_machine import BOOT_FILES, CACHE, NEWER, PROJECT, Card, Pi, TrialError, make_roots, run
 from payloads.mission_data import mission_items
 from protocols.mission_item import MissionItem, MissionResult
+from service.cli.card import FOLDER, RESULT
 from service.cli.demo import ClientError, MissionClient, connect
 from storage.mission_store import VERIFIED, open_store
 from terminal.files import load_mission
@@ -308,6 +310,101 @@ def start_again(pi: Pi, plug: Plug) -> None:
         card.image.unlink()
 
 
+#: What Raspberry Pi Imager leaves on the boot partition for the first start of bookworm.
+_SYSTEMD_RUN = "systemd.run=/boot/firmware/firstrun.sh systemd.run_success_action=reboot"
+_FIRST_START = {
+    "firstrun": {
+        "cmdline.txt": f"{BOOT_FILES['cmdline.txt'].strip()} {_SYSTEMD_RUN} systemd.unit=kernel-command-line.target\n",
+        "firstrun.sh": "#!/bin/bash\n\nset +e\n\nrm -f /boot/firmware/firstrun.sh\n"
+        "sed -i 's| systemd.run.*||g' /boot/firmware/cmdline.txt\nexit 0\n",
+    },
+}
+_NO_HOTSPOT = "opening the hotspot failed"
+_IS_SET_UP = "naze-bridge is set up."
+#: At most; an emulated Pi takes about 15 minutes.
+_FIRST_START_S = 5400
+
+
+def starts_by_firstrun(pi: Pi, _naze: Naze) -> None:
+    """A card of Imager and `naze-bridge card` sets itself up by firstrun.sh, once the hotspot can be opened."""
+    sets_itself_up(pi, prepared_card("firstrun", has_radio=False), has_radio=False)
+
+
+def repeats_a_cut_start(pi: Pi, plug: Plug) -> None:
+    """The plug is pulled while the first start installs the package: the next start repeats it."""
+    pi.cut()
+    card = prepared_card("firstrun", has_radio=True)
+    until_told(pi, card, "Now: installing the package")
+    pi.until("grep '^Unpacking naze-bridge' /var/log/naze-bridge-card.log")
+    time.sleep(plug.chance.uniform(0, 20))
+    pi.cut()
+    with card.mounted() as root:
+        cut = run("dpkg-query", "--admindir", root / "var/lib/dpkg", "--show", "--showformat", "${Package} ${Status}\n")
+        said = [line for line in cut.splitlines() if not line.endswith(" ok installed")]
+    check("Now: installing the package" in card.read(RESULT), f"the plug was pulled too late: {card.read(RESULT)}")
+    say(f"pulled in the first start; dpkg: {said or 'in order'}")
+    sets_itself_up(pi, card, has_radio=True)
+
+
+def sets_itself_up(pi: Pi, card: Card, *, has_radio: bool) -> None:
+    """Start a prepared card until it is set up, and once more. A missing radio is switched on when it is waited for."""
+    pi.cut()
+    if not has_radio:
+        told = until_told(pi, card, _IS_SET_UP, _NO_HOTSPOT)
+        check(_NO_HOTSPOT in told, "the first start succeeded without a hotspot")
+        check(card.read(f"{FOLDER}/password"), "the card cannot try again: its password is gone")
+        pi.until("nmcli radio wifi on")
+    until_told(pi, card, _IS_SET_UP)
+    until_off(pi)
+    said = card.read(RESULT)
+    say(f"{card.image.stem}: {said.splitlines()[0]}")
+    check(_SSID in said and "http://10.42.0.1:8080/" in said, f"the result does not say what to do: {said}")
+    for folder in (FOLDER, f"{FOLDER}.done"):
+        check(not card.read(f"{folder}/password"), "the hotspot's password is left on the boot partition")
+    pi.start(card)
+    pi.until(f"{_HAS_HOTSPOT} && {_HAS_BOARD}", 1800)
+    check(pi.run("cat /etc/hostname") == "kite\n", "the Pi has another name")
+    check(pi.run("readlink /dev/serial0") == "ttyS0\n", "the header is not the mini-UART's")
+    left = pi.run("ls /etc/systemd/system; dpkg --audit; systemctl --failed --plain --no-legend")
+    check("naze-bridge-card" not in left and "failed" not in left, f"not set up, or not cleaned up: {left}")
+
+
+def prepared_card(system: str, *, has_radio: bool) -> Card:
+    """A card as Raspberry Pi Imager and `naze-bridge card` leave it."""
+    card = Card.written(CACHE / "work" / f"{system}.img", CACHE / "bare", BOOT_FILES | _FIRST_START[system])
+    with TemporaryDirectory() as folder, TemporaryDirectory() as secret:
+        run("mcopy", "-s", "-n", "-i", card.fat, "::/*", folder)
+        password = Path(secret, "password")
+        password.write_text(f"{_PASSWORD}\n")
+        options = ("--hotspot", _SSID, "--password-file", password, "--country", "DE", "--name", "kite")
+        run(_PROGRAM, "card", folder, "--package", CACHE / "naze-bridge.deb", *options)
+        run("mcopy", "-s", "-o", "-i", card.fat, *Path(folder).iterdir(), "::/")
+    with card.mounted() as root:
+        # As the images: until raspi-config has set the country, the radio is off. This Debian has no raspi-config.
+        state = root / "var/lib/NetworkManager/NetworkManager.state"
+        state.parent.mkdir(exist_ok=True)
+        state.write_text(f"[main]\nWirelessEnabled={str(has_radio).lower()}\n")
+    return card
+
+
+def until_told(pi: Pi, card: Card, *texts: str) -> str:
+    """Keep the Pi on until the card's result has one of the texts. Returns the result."""
+    end = time.monotonic() + _FIRST_START_S
+    while not any(text in (said := card.read(RESULT)) for text in texts):
+        check(time.monotonic() < end, f"not told after {_FIRST_START_S} s: {texts}; the card says: {said}")
+        if pi.is_off():
+            pi.power(card)
+        time.sleep(1)
+    return said
+
+
+def until_off(pi: Pi) -> None:
+    end = time.monotonic() + 900
+    while not pi.is_off():
+        check(time.monotonic() < end, "the Pi does not restart")
+        time.sleep(1)
+
+
 def opens_a_hotspot(pi: Pi, _naze: Naze) -> None:
     """Setup opens a hotspot. A phone joins it by another radio, and is led to the status page."""
     pi.run(f"echo {_PASSWORD} >/root/password")
@@ -380,6 +477,8 @@ def main() -> None:
         (survives, (pi, plug, given.pulls * 7 // 10)),
         (updates, (pi, plug, given.pulls * 3 // 10)),
         (start_again, (pi, plug)),
+        (starts_by_firstrun, (pi, naze)),
+        (repeats_a_cut_start, (pi, plug)),
     ]
     try:
         for part, words in parts:
