@@ -129,7 +129,7 @@ def test_many_bit_errors_are_recovered() -> None:
 
 
 def test_a_repeated_push_continues_where_it_ended() -> None:
-    for seed in seeds(4):
+    for seed in range(4):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = 1e-3
         for _ in range(3):
@@ -143,7 +143,7 @@ def test_a_repeated_push_continues_where_it_ended() -> None:
 
 @pytest.mark.parametrize("rate", [1e-3, 4e-3])
 def test_a_push_over_a_bad_line_ends_before_mission_planner_times_out(rate: float) -> None:
-    for seed in seeds(3):
+    for seed in range(3):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = rate
         outcome = world.push(NEW)
@@ -203,7 +203,8 @@ def test_a_push_fails_after_a_long_stall() -> None:
     reported = outcomes(
         lambda world, draw: world.after(draw.random() * 0.4, lambda: setattr(world.faults, "hang", True)), 6
     )
-    assert set(reported) <= {"ACCEPTED", PushFailure.NO_ANSWER.value.text, PushFailure.UNCERTAIN.value.text}
+    failures = {PushFailure.NO_ANSWER.value.text, PushFailure.UNCERTAIN.value.text, "No link to the flight controller"}
+    assert set(reported) <= failures | {"ACCEPTED"}
     assert reported["ACCEPTED"] < reported.total()
 
 

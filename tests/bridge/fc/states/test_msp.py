@@ -16,7 +16,7 @@ from tests.support.world import World
 @pytest.mark.parametrize("baud", ALL_SPEEDS)
 def test_a_board_is_found_within_3_s_of_booting_after_any_power_cycle(baud: int, extension: bool) -> None:
     draw = random.Random(baud)
-    for _ in seeds(2):
+    for _ in range(2):
         boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
         world = World(SimOptions(baud=baud, boot_ms=boot_s * 1000), Faults(extension=extension))
         world.wait_until(verdict, 10)
