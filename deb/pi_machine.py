@@ -53,7 +53,7 @@ printf '/dev/mmcblk0p2 / ext4 defaults,noatime 0 1\n/dev/mmcblk0p1 /boot/firmwar
 mkdir -p /boot/firmware /var/log/journal
 sed -i 's/^MODULES=.*/MODULES=list/' /etc/initramfs-tools/initramfs.conf
 printf '%s\n' bcm2835 sdhci_iproc mmc_block ext4 crc32c_generic >>/etc/initramfs-tools/modules
-apt-get install --yes --no-install-recommends linux-image-arm64
+apt-get install --yes --no-install-recommends linux-image-arm64 cloud-init
 printf '%s\n' bcm2835_wdt dwc2 mac80211_hwsim >/etc/modules-load.d/pi.conf
 # QEMU has no chips for these drivers, and emulates slowly.
 printf 'blacklist %s\n' vc4 hci_uart brcmfmac snd_bcm2835 bcm2835_v4l2 >/etc/modprobe.d/pi.conf
@@ -71,6 +71,12 @@ NAME
 chmod +x /usr/lib/udev/pi-serial
 echo 'SUBSYSTEM=="tty", KERNEL=="ttyAMA*|ttyS*", PROGRAM="/usr/lib/udev/pi-serial %k", SYMLINK+="%c"' \
     >/etc/udev/rules.d/99-com.rules
+# As Raspberry Pi OS trixie has it. Bookworm has no cloud-init, so a card's writer removes the last file.
+printf 'datasource_list: [NoCloud, None]\ndatasource: {NoCloud: {seedfrom: "file:///boot/firmware/"}}\n' \
+    >/etc/cloud/cloud.cfg.d/99_raspberry-pi.cfg
+mkdir -p /etc/systemd/system/cloud-init-local.service.d
+printf '[Unit]\nRequiresMountsFor=/boot/firmware\n' >/etc/systemd/system/cloud-init-local.service.d/boot.conf
+touch /etc/cloud/cloud-init.disabled
 systemctl mask apt-daily.timer apt-daily-upgrade.timer e2scrub_all.timer fstrim.timer
 apt-get clean
 """

@@ -310,13 +310,19 @@ def start_again(pi: Pi, plug: Plug) -> None:
         card.image.unlink()
 
 
-#: What Raspberry Pi Imager leaves on the boot partition for the first start of bookworm.
+#: What Raspberry Pi Imager leaves on the boot partition for the first start: of bookworm, and of trixie.
 _SYSTEMD_RUN = "systemd.run=/boot/firmware/firstrun.sh systemd.run_success_action=reboot"
 _FIRST_START = {
     "firstrun": {
         "cmdline.txt": f"{BOOT_FILES['cmdline.txt'].strip()} {_SYSTEMD_RUN} systemd.unit=kernel-command-line.target\n",
         "firstrun.sh": "#!/bin/bash\n\nset +e\n\nrm -f /boot/firmware/firstrun.sh\n"
         "sed -i 's| systemd.run.*||g' /boot/firmware/cmdline.txt\nexit 0\n",
+    },
+    "cloud-init": {
+        "meta-data": "instance-id: rpi-imager-1764288000000\n",
+        "user-data": "#cloud-config\nhostname: pi\nmanage_etc_hosts: true\n"
+        "users:\n- name: kim\n  groups: users,dialout,netdev\n  shell: /bin/bash\n  lock_passwd: true\n"
+        "runcmd:\n- [touch, /root/by-imager]\n",
     },
 }
 _NO_HOTSPOT = "opening the hotspot failed"
@@ -328,6 +334,12 @@ _FIRST_START_S = 5400
 def starts_by_firstrun(pi: Pi, _naze: Naze) -> None:
     """A card of Imager and `naze-bridge card` sets itself up by firstrun.sh, once the hotspot can be opened."""
     sets_itself_up(pi, prepared_card("firstrun", has_radio=False), has_radio=False)
+
+
+def starts_by_cloud_init(pi: Pi, _naze: Naze) -> None:
+    """The same by cloud-init, where the Imager's own commands run, too."""
+    sets_itself_up(pi, prepared_card("cloud-init", has_radio=False), has_radio=False)
+    check("by-imager" in pi.run("ls /root"), "the Imager's own commands did not run")
 
 
 def repeats_a_cut_start(pi: Pi, plug: Plug) -> None:
@@ -384,6 +396,8 @@ def prepared_card(system: str, *, has_radio: bool) -> Card:
         state = root / "var/lib/NetworkManager/NetworkManager.state"
         state.parent.mkdir(exist_ok=True)
         state.write_text(f"[main]\nWirelessEnabled={str(has_radio).lower()}\n")
+        if system == "cloud-init":
+            (root / "etc/cloud/cloud-init.disabled").unlink()
     return card
 
 
@@ -477,7 +491,7 @@ def main() -> None:
         (survives, (pi, plug, given.pulls * 7 // 10)),
         (updates, (pi, plug, given.pulls * 3 // 10)),
         (start_again, (pi, plug)),
-        (starts_by_firstrun, (pi, naze)),
+        *((part, (pi, naze)) for part in (starts_by_firstrun, starts_by_cloud_init)),
         (repeats_a_cut_start, (pi, plug)),
     ]
     try:
