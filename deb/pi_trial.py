@@ -419,6 +419,29 @@ def until_off(pi: Pi) -> None:
         time.sleep(1)
 
 
+def leaves_the_mini_uart(pi: Pi, naze: Naze) -> None:
+    """Doctor names the mini-UART of a silent board, and the command that it gives moves the header to the PL011."""
+    pi.cut()
+    words = BOOT_FILES["cmdline.txt"].replace("console=serial0,115200 ", "")
+    on = {"config.txt": "[all]\nenable_uart=1\n", "cmdline.txt": words}
+    card = Card.written(CACHE / "work" / "mini.img", CACHE / "ready", BOOT_FILES | on)
+    pi.start(card)
+    pi.until(_HAS_BOARD)
+    check(pi.run("readlink /dev/serial0") == "ttyS0\n", "the header is not the mini-UART's")
+    naze.control("power off")
+    said = pi.until("naze-bridge doctor --json | grep 'the port is the mini-UART'")
+    command = "printf" + json.loads(said)["remedy"].partition(": printf")[2]
+    say(f"doctor: {command}")
+    # Debian's bare root has no sudo. The connection may end before the command does.
+    with suppress(TrialError):
+        pi.run(f'sudo() {{ "$@"; }}; {command}')
+    until_off(pi)
+    naze.control("power on")
+    pi.start(card)
+    check(pi.run("readlink /dev/serial0") == "ttyAMA0\n", "the header is not the PL011's")
+    pi.until(_HAS_BOARD)
+
+
 def opens_a_hotspot(pi: Pi, _naze: Naze) -> None:
     """Setup opens a hotspot. A phone joins it by another radio, and is led to the status page."""
     pi.run(f"echo {_PASSWORD} >/root/password")
@@ -493,6 +516,7 @@ def main() -> None:
         (start_again, (pi, plug)),
         *((part, (pi, naze)) for part in (starts_by_firstrun, starts_by_cloud_init)),
         (repeats_a_cut_start, (pi, plug)),
+        (leaves_the_mini_uart, (pi, naze)),
     ]
     try:
         for part, words in parts:
