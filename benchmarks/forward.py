@@ -30,11 +30,12 @@ _ROUNDS = 3
 _RATES: dict[str, float | None] = {"150/s": 150.0, "500/s": 500.0, "3000/s": 3000.0, "unpaced": None}
 _SETTLING_S = 0.5
 _WATCHED_S = 2.0
-#: The limits by rate, as multiples of other forwarders' figures.
+#: The limits by rate, as multiples of other forwarders' figures. On a quiet machine, where a wake-up costs a C program
+#: 10 us, the multiples are the largest: beside other work they were 1.3, 1.1 and 1.3.
 _LIMITS: dict[str, dict[str, float]] = {
-    "150/s": {MAVLINK_ROUTER: 1.8},
-    "500/s": {MAVLINK_ROUTER: 1.8},
-    "3000/s": {FLOOR: 2.0, MAVLINK_ROUTER: 1.2},
+    "150/s": {MAVLINK_ROUTER: 3.5},
+    "500/s": {MAVLINK_ROUTER: 2.5},
+    "3000/s": {FLOOR: 2.2, MAVLINK_ROUTER: 2.0},
     "unpaced": {MAVLINK_ROUTER: 1.1},
 }
 _OTHERS = (FLOOR, MAVLINK_ROUTER)
