@@ -569,6 +569,13 @@ static void step(flight_t *flight)
     measure(&flight->out);
 }
 
+static void switch_on(flight_t *flight)
+{
+    flight->in.switch_on = flight->toggled = true;
+    step(flight);
+    flight->toggled = false;
+}
+
 static void prepare_with(flight_t *flight, bool aloft, const lies_t *lies)
 {
     memset(flight, 0, sizeof *flight);
@@ -614,9 +621,7 @@ static void fly_undisturbed(void)
     settings.battery = NF_BATTERY_TOLD;
     settings.fence_m = 0;
     prepare_with(&flight, !takes_off, &lies);
-    flight.in.switch_on = flight.toggled = true;
-    step(&flight);
-    flight.toggled = false;
+    switch_on(&flight);
     for (int i = 0; i < LIMIT_S * 1000 / STEP_MS && !is_over(&flight) && craft.armed; i++)
         step(&flight);
     const uint8_t last = list.record[list.count - 1].command;
@@ -749,17 +754,13 @@ static void test_switch(void)
     CHECK(flight.out.mode == NF_PASS && flight.core.reason == NF_NOT_ARMED);
     flight.in.switch_on = false;
     step(&flight);
-    flight.in.switch_on = flight.toggled = true;
-    step(&flight);
-    flight.toggled = false;
+    switch_on(&flight);
     while (flight.core.record < 3)
         step(&flight);
     flight.in.switch_on = false;
     step(&flight);
     CHECK(flight.core.reason == NF_SWITCHED_OFF);
-    flight.in.switch_on = flight.toggled = true;
-    step(&flight);
-    flight.toggled = false;
+    switch_on(&flight);
     step(&flight);
     CHECK(flight.core.record == 3 && flight.core.state == NF_LEG);
     while (flight.core.state == NF_LEG)
@@ -781,9 +782,7 @@ static void test_stall(void)
     add(&record);
     prepare(&flight, true);
     craft.height = 1000;
-    flight.in.switch_on = flight.toggled = true;
-    step(&flight);
-    flight.toggled = false;
+    switch_on(&flight);
     for (int i = 0; i < 60 * 1000 / STEP_MS; i++) {
         const double north = craft.at.n;
         step(&flight);
@@ -808,9 +807,7 @@ static void fly_north(flight_t *flight, const lies_t *lies)
     craft.at = craft.wind = (vector_t){0, 0};
     for (int i = 0; i < HISTORY; i++)
         step(flight);
-    flight->in.switch_on = flight->toggled = true;
-    step(flight);
-    flight->toggled = false;
+    switch_on(flight);
     for (int i = 0; i < 8000 / STEP_MS; i++)
         step(flight);
     CHECK(flight->core.state == NF_LEG);
@@ -922,9 +919,7 @@ static void begin_landing(flight_t *flight)
     craft.at = (vector_t){0, 0};
     craft.wind = (vector_t){800, 0};
     go_on(flight, 1);
-    flight->in.switch_on = flight->toggled = true;
-    step(flight);
-    flight->toggled = false;
+    switch_on(flight);
     while (craft.height > 250) {
         craft.gust = (vector_t){0, 0};
         step(flight);
@@ -1070,9 +1065,7 @@ static double stops_within(double mass, double wind_cm_s, double *farthest)
         step(&flight);
     }
     const double begun = craft.at.n;
-    flight.in.switch_on = flight.toggled = true;
-    step(&flight);
-    flight.toggled = false;
+    switch_on(&flight);
     for (int i = 0; i < 400 && !(flight.core.holding && st_speed(&flight.core.steer) < 60); i++) {
         craft.gust = (vector_t){0, 0};
         step(&flight);
@@ -1118,9 +1111,7 @@ static double takeoff_drift(double mass, double wind_cm_s)
         craft.wind = (vector_t){wind_cm_s, 0};
         craft.at = (vector_t){0, 0};
         go_on(&flight, 1);
-        flight.in.switch_on = flight.toggled = true;
-        step(&flight);
-        flight.toggled = false;
+        switch_on(&flight);
         for (int k = 0; k < 12000 / STEP_MS; k++) {
             step(&flight);
             farthest = fmax(farthest, hypot(craft.at.n, craft.at.e) / 100);
