@@ -337,9 +337,16 @@ def starts_by_firstrun(pi: Pi, _naze: Naze) -> None:
 
 
 def starts_by_cloud_init(pi: Pi, _naze: Naze) -> None:
-    """The same by cloud-init, where the Imager's own commands run, too."""
-    sets_itself_up(pi, prepared_card("cloud-init", has_radio=False), has_radio=False)
+    """The same by cloud-init, where the Imager's own commands run, too. A name given later is kept, too."""
+    card = prepared_card("cloud-init", has_radio=False)
+    sets_itself_up(pi, card, has_radio=False)
     check("by-imager" in pi.run("ls /root"), "the Imager's own commands did not run")
+    pi.run("naze-bridge setup --yes --name heron || true; sync")  # 1: doctor's, for the open link
+    pi.cut()
+    pi.start(card)
+    pi.until("[ -e /run/cloud-init/result.json ]")
+    named = pi.run("cat /etc/hostname; hostname; grep -c heron /etc/hosts")
+    check(named == "heron\nheron\n1\n", f"cloud-init took back the name: {named}")
 
 
 def repeats_a_cut_start(pi: Pi, plug: Plug) -> None:

@@ -25,6 +25,7 @@ from service.cli.helper.signature import SIGNERS, check_signature, has_key, is_s
 from service.cli.setup.answers import PAGE_PORT
 from service.cli.setup.command import check_answers, secret_line
 from service.cli.setup.hotspot import ADDRESS, CONNECTION
+from service.cli.setup.steps import renamed_user_data
 from service.machine.package import shipped
 from service.settings.passphrase import new_passphrase, weakness
 from service.web.token import new_token
@@ -253,11 +254,9 @@ def _check_signed(package: Path) -> str:
 def _architecture(boot: Path) -> str | None:
     """The architecture of the card's system, by its kernels, or None if they do not decide it."""
     is_32_bit = any((boot / f"kernel{kind}.img").exists() for kind in ("", "7", "7l"))
-    is_64_bit = (boot / "kernel8.img").exists()
-    runs_64_bit = re.search("^arm_64bit=1", _text(boot / "config.txt"), re.MULTILINE)
-    if is_32_bit:
-        return None if runs_64_bit else "armhf"
-    return "arm64" if is_64_bit else None
+    if not is_32_bit:
+        return "arm64" if (boot / "kernel8.img").exists() else None
+    return None if re.search("^arm_64bit=1", _text(boot / "config.txt"), re.MULTILINE) else "armhf"
 
 
 def _text(path: Path) -> str:
@@ -278,8 +277,7 @@ def _hooked(boot: Path, name: str | None) -> tuple[Path, str] | None:
         text = _text(user_data)
         if not text.startswith("#cloud-config"):
             raise CardError(f"{user_data} is not cloud-init's: write the card again")
-        # At each start cloud-init returns to the name that is here.
-        text = re.sub("^hostname:.*", f"hostname: '{name}'", text, flags=re.MULTILINE) if name else text
+        text = renamed_user_data(text, name) if name else text
         return user_data, text if _IN_USER_DATA in text else _with_command(user_data, text)
     if not firstrun.exists() and (boot / FOLDER / "first-boot.sh").exists():
         return None

@@ -153,18 +153,12 @@ def setup(
 
 def _switch_network(steps: list[Step], machine: Machine, hotspot: str | None, *, ask: bool, is_kept: bool) -> None:
     """Open the hotspot last: it may end the connection over which setup is run."""
-    if not steps:
-        return
-    if all(not isinstance(change, Run) for step in steps for change in step.changes):
-        _carry_out(steps, machine)
-        return
-    click.echo(
-        f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}, and a connection over the present Wi-Fi network ends."
-    )
-    if not is_kept:
-        click.echo(f"Join it within {JOIN_S // 60} minutes: if no device does, the Pi returns to the current network.")
-    if ask:
-        click.prompt("Press Enter when you have noted the above", default="", show_default=False)
+    if any(isinstance(change, Run) for step in steps for change in step.changes):
+        click.echo(f"\nNow the Wi-Fi changes to the hotspot {hotspot!r}: a connection over the present network ends.")
+        if not is_kept:
+            click.echo(f"Join it within {JOIN_S // 60} minutes, or the Pi returns to the present network.")
+        if ask:
+            click.prompt("Press Enter when you have noted the above", default="", show_default=False)
     _carry_out(steps, machine)
 
 

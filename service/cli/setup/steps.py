@@ -98,10 +98,11 @@ def _country(host: Host, answers: SetupChoices) -> Iterator[Step]:
 def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     if answers.name is None or host.read("/etc/hostname").strip() == answers.name:
         return
-    old = host.read("/etc/hostname").strip()
-    hosts = host.read("/etc/hosts")
+    old, hosts = host.read("/etc/hostname").strip(), host.read("/etc/hosts")
     renamed = re.sub(rf"^(127\.0\.1\.1\s+){re.escape(old)}$", rf"\g<1>{answers.name}", hosts, flags=re.MULTILINE)
     changes: list[Change] = [WriteFile("/etc/hosts", renamed)] if old and renamed != hosts else []
+    if (file := boot_file(host, "user-data")) is not None and (text := host.read(file)):
+        changes.append(WriteFile(file, renamed_user_data(text, answers.name)))
     if _now(host):
         changes.append(Run(("hostnamectl", "set-hostname", answers.name)))
         if host.path("/etc/avahi").exists():
@@ -110,6 +111,11 @@ def _name(host: Host, answers: SetupChoices) -> Iterator[Step]:
     else:
         changes.append(WriteFile("/etc/hostname", f"{answers.name}\n"))
     yield Step(f"name this machine {answers.name}.local", changes)
+
+
+def renamed_user_data(text: str, name: str) -> str:
+    """Cloud-init's user-data with another host name, to which it returns at each start."""
+    return re.sub("^hostname:.*", f"hostname: '{name}'", text, flags=re.MULTILINE)
 
 
 def _key(host: Host, answers: SetupChoices) -> Iterator[Step]:

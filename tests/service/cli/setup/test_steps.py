@@ -109,6 +109,16 @@ def test_a_pi_5_whose_serial0_is_the_header_loses_the_console(tmp_path: Path, se
     assert "console=serial0" not in pi.read(CMDLINE)
 
 
+def test_cloud_init_keeps_the_chosen_name(tmp_path: Path) -> None:
+    """At each start it sets the name in its file on the boot partition, by which it writes /etc/hosts, too."""
+    pi = FreshPi(tmp_path, "4")
+    pi.write("/boot/firmware/user-data", "#cloud-config\nhostname: raspberrypi\nmanage_etc_hosts: true\nusers: []\n")
+    pi.carry_out(missing_steps(pi, SetupChoices(name="kite")))
+    named = "#cloud-config\nhostname: 'kite'\nmanage_etc_hosts: true\nusers: []\n"
+    assert pi.read("/boot/firmware/user-data") == named
+    assert missing_steps(pi, SetupChoices(name="kite")) == []
+
+
 def test_a_failed_hotspot_is_retried(tmp_path: Path) -> None:
     pi = FreshPi(tmp_path, "4")
     answers = SetupChoices(hotspot=("naze field", "long-enough"))
