@@ -24,6 +24,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from deb.build import build
+from service.cli.helper.signature import SIGNERS
+from tests.support.release_key import ReleaseKey
 
 PROJECT = Path(__file__).resolve().parent.parent
 CACHE = Path.home() / ".cache" / "naze-bridge-pi-trial"
@@ -33,6 +35,7 @@ _PACKAGES = (
     *("wpasupplicant", "dnsmasq-base", "iw", "udhcpc"),
 )
 NEWER = "99.0"
+NEWER_PACKAGE = CACHE / "newer.deb"
 _MIB = 1 << 20
 #: A card's size must be a power of two for QEMU. FAT, then ext4, as on a card of Raspberry Pi OS.
 _SIZE, _FAT_AT, _FAT_SIZE = 2048 * _MIB, _MIB, 128 * _MIB
@@ -79,6 +82,7 @@ printf '[Unit]\nRequiresMountsFor=/boot/firmware\n' >/etc/systemd/system/cloud-i
 touch /etc/cloud/cloud-init.disabled
 systemctl mask apt-daily.timer apt-daily-upgrade.timer e2scrub_all.timer fstrim.timer
 apt-get clean
+rm -rf /var/lib/apt/lists/*
 """
 _INSTALL = """
 dpkg --install /root/naze-bridge.deb
@@ -115,11 +119,14 @@ def make_roots() -> None:
         package = build("arm64", ("3.11",), Path(folder), compression="none").rename(CACHE / "naze-bridge.deb")
     shutil.copy(package, ready / "root" / "naze-bridge.deb")
     _inside(ready, _INSTALL)
-    _repack(package, ready / "root" / "newer.deb")
+    with TemporaryDirectory(dir=CACHE) as folder:
+        release = ReleaseKey(Path(folder, "key"))
+        shutil.copy(release.signers, ready / SIGNERS[1:])
+        release.sign(_repacked(package, release.signers))
 
 
-def _repack(package: Path, newer: Path) -> None:
-    """Pack the package again with a higher version, which differs in many modules."""
+def _repacked(package: Path, signers: Path) -> Path:
+    """Pack the package again with a higher version, which differs in many modules, and with a key for updates."""
     with TemporaryDirectory(dir=CACHE) as folder:
         tree = Path(folder, "tree")
         run("dpkg-deb", "--raw-extract", package, tree)
@@ -127,7 +134,9 @@ def _repack(package: Path, newer: Path) -> None:
         control.write_text(re.sub("^Version: .*", f"Version: {NEWER}", control.read_text(), flags=re.MULTILINE))
         for module in tree.glob("usr/lib/naze-bridge/**/service/**/*.py"):
             module.write_text(f"{module.read_text()}# {NEWER}\n")
-        run("dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, newer)
+        shutil.copy(signers, tree / SIGNERS[1:])
+        run("dpkg-deb", "--root-owner-group", "-Zzstd", "-z10", "--build", tree, NEWER_PACKAGE)
+    return NEWER_PACKAGE
 
 
 def _inside(root: Path, script: str) -> None:
@@ -234,6 +243,8 @@ class Pi:
         self._folder, self._board = folder, board
         self._qemu: subprocess.Popen[bytes] | None = None
         self._card: Card
+        #: The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
+        self.clock: tuple[str, ...] = ("-icount", "shift=1")
         self.ports = {"ssh": 0, "gcs": 0, "page": 0}
         self.speeds: list[int] = []
         files = CACHE / "bare"
@@ -276,8 +287,7 @@ class Pi:
         self._qemu = subprocess.Popen(
             [
                 *("qemu-system-aarch64", "-M", "raspi3b", "-display", "none", "-no-reboot", "-monitor", "none"),
-                # The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
-                *("-icount", "shift=1"),
+                *self.clock,
                 *("-kernel", self._kernel, "-initrd", self._initrd, "-dtb", tree, "-append", words),
                 *("-drive", f"if=sd,format=raw,file={card.image}"),
                 *("-chardev", f"socket,id=header,path={pins},server=on,wait=off"),

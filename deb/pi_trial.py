@@ -41,7 +41,7 @@ from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
 
-from deb.pi_machine import BOOT_FILES, CACHE, NEWER, PROJECT, Card, Pi, TrialError, make_roots, run
+from deb.pi_machine import BOOT_FILES, CACHE, NEWER, NEWER_PACKAGE, PROJECT, Card, Pi, TrialError, make_roots, run
 from payloads.mission_data import mission_items
 from protocols.mission_item import MissionItem, MissionResult
 from service.cli.card import FOLDER, RESULT
@@ -201,12 +201,9 @@ class Pilot(Thread):
 
     def _save(self, sysid: int) -> None:
         """A setting from the status page."""
-        token = self._pi.run("cat /var/lib/naze-bridge/web-token").strip()
+        token = token_of(self._pi)
         self.done = replace(self.done, sysids=self.done.sysids | {sysid}, act=f"save of {sysid}")
-        fetch(self._pi, "/api/pi", token, {"action": "settings", "values": {"sysid": sysid}})
-        while not (job := fetch(self._pi, "/api/pi", token))["done"]:
-            time.sleep(0.2)
-        check("reply" in job, f"not saved: {job}")
+        ask_page(self._pi, token, {"action": "settings", "values": {"sysid": sysid}})
         self.done = replace(self.done, sysids=frozenset({sysid}), act="connecting")
 
 
@@ -268,32 +265,29 @@ def survives(pi: Pi, plug: Plug, pulls: int) -> None:
     plug.done = pilot.done
 
 
-#: As the status page's update does it (service/cli/helper/packages.py), without keeping the present version.
-_UPDATE = """
-set -e
-mkdir -p /var/lib/naze-bridge-helper
-cp /root/{}.deb /var/lib/naze-bridge-helper/new.deb
-sync
-mv /var/lib/naze-bridge-helper/new.deb /var/lib/naze-bridge-helper/installing.deb
-dpkg --force-confold --install /var/lib/naze-bridge-helper/installing.deb
-rm /var/lib/naze-bridge-helper/installing.deb
-"""
 _IS_UPDATED = "[ ! -e /var/lib/naze-bridge-helper/installing.deb ]"
+_PIECE = 256 << 10
 
 
 def updates(pi: Pi, plug: Plug, pulls: int) -> None:
-    """The plug is pulled during an update and the way back: missions and settings are kept."""
-    for package, version in (("newer", NEWER), ("naze-bridge", "0.")):
-        work = Thread(target=pi.run, args=(_UPDATE.format(package),), daemon=True)
-        work.start()
+    """The plug is pulled during the page's update and the way back: missions and settings are kept."""
+    token, package = token_of(pi), NEWER_PACKAGE.read_bytes()
+    for start in range(0, len(package), _PIECE):
+        fetch(pi, f"/api/pi/package?start={start}", token, package[start : start + _PIECE])
+    for action, version in (("install", NEWER), ("downgrade", "0.")):
+        said = ask_page(pi, token, {"action": action})
+        check(said["version"].startswith(version), f"the page announces another version: {said}")
         for _ in range(pulls // 2):
-            work.join(plug.chance.uniform(0, 15))
-            if work.is_alive():
-                plug.pull(partial(replace, plug.done, act=f"update to {version}"))
-        work.join()
+            time.sleep(plug.chance.uniform(0, 40))
+            plug.pull(partial(replace, plug.done, act=f"update to {version}"))
+        pi.until(f"grep '^Version {version}.* was installed' /var/lib/naze-bridge-helper/outcome", 3600)
         found = pi.run("dpkg-query --showformat '${Version}' --show naze-bridge")
         check(found.startswith(version), f"version {found} instead of {version}")
         pi.until(_HAS_BOARD)
+        mark = max(plug.done.marks) + 1
+        with station(pi) as gcs:
+            check(gcs.write(mission(mark), lambda _: None) is MissionResult.ACCEPTED, f"not accepted: {gcs.texts}")
+        plug.done = replace(plug.done, marks=plug.done.marks | {mark})
         plug.pull(lambda: plug.done)
 
 
@@ -485,10 +479,22 @@ GET
 """
 
 
-def fetch(pi: Pi, path: str, token: str = "", data: object = None) -> Any:
+def token_of(pi: Pi) -> str:
+    return pi.run("cat /var/lib/naze-bridge/web-token").strip()
+
+
+def ask_page(pi: Pi, token: str, request: object) -> Any:
+    """The reply to a request about the Pi itself."""
+    fetch(pi, "/api/pi", token, json.dumps(request).encode(), "application/json")
+    while not (job := fetch(pi, "/api/pi", token))["done"]:
+        time.sleep(0.2)
+    check("reply" in job, f"{request}: {job}")
+    return job["reply"]
+
+
+def fetch(pi: Pi, path: str, token: str, body: bytes | None = None, kind: str = "application/octet-stream") -> Any:
     """A request to the status page's API, from outside."""
-    headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
-    body = None if data is None else json.dumps(data).encode()
+    headers = {"Authorization": f"Bearer {token}", "Content-Type": kind}
     request = urllib.request.Request(f"http://127.0.0.1:{pi.ports['page']}{path}", body, headers)
     with urllib.request.urlopen(request, timeout=60) as reply:  # noqa: S310  # our own address
         return json.load(reply)
