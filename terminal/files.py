@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from protocols.mission_file import MissionFileError, read_mission_file
+from protocols.mission_file.error import NO_HOME
 from protocols.mission_item import MissionItem
 from protocols.plain_text import FileError, plain_text
 from protocols.remedies import Fault
@@ -30,21 +31,22 @@ def read_file(path: Path, failure: type[FileError]) -> bytes:
         raise _failed(path, error, failure) from None
 
 
-def load_mission(path: Path, alt_m: float | None = None) -> list[MissionItem]:
-    """Read the mission file at `path`; MissionFileError if it or the disk is damaged. Notes go to standard error.
+def load_mission(path: Path, alt_m: float | None = None, *, has_home: bool = False) -> list[MissionItem]:
+    """Read the mission file at `path`. MissionFileError if it or the disk is damaged. Notes go to standard error.
 
-    alt_m: the height above home of all points of a path (KML, GPX or CSV).
+    alt_m: the height above home of all points of a path (KML, GPX or CSV). has_home: True if a person gives home.
     """
     name = shown_path(path)
 
     def note(text: str) -> None:
-        complain(f"{name}, {text}")
+        if not (has_home and text == NO_HOME):
+            complain(f"{name}, {text}")
 
     return read_mission_file(read_file(path, MissionFileError), name, note, alt_m)
 
 
 def assumed_home(items: Sequence[MissionItem], name: str) -> tuple[int, int] | None:
-    """The place of the first waypoint, if a list that is checked offline has no home; degrees * 1e7."""
+    """The place of the first waypoint, if a list that is checked offline lacks a home; degrees * 1e7."""
     if items[0].lat_e7 or items[0].lon_e7:
         return None
     complain(f"{name}, home is assumed at the first waypoint; `naze-bridge check --home LAT,LON` gives it")

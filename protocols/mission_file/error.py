@@ -23,7 +23,7 @@ Note = Callable[[str], None]
 
 
 #: The note on a file without a home, by its kind or by mistake.
-NO_HOME = "the file has no home: the craft's position is used, or --home"
+NO_HOME = "the file has no home: give --home, or the craft's position is used"
 
 
 def no_note(_text: str) -> None:

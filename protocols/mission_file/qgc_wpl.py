@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QGC WPL 110, the text format of Mission Planner and most others (https://mavlink.io/en/file_formats/).
 
-Version 120, as QGroundControl wrote it for PX4 from 2011 on, has the same fields but no home. Version 100 is older than
-MAVLink 1: other numbers of commands, another order of fields (pymavlink's mavwp.py).
+Version 120, as QGroundControl wrote it for PX4 from 2011 on, has the same fields but lacks home. Version 100 is older
+than MAVLink 1: other numbers of commands, another order of fields (pymavlink's mavwp.py).
 
 A header line, then one item a line: seq, current, frame, command, param1..4, latitude, longitude, altitude and
 autocontinue. Usually separated by tabs. Any white space, commas and semicolons are accepted. Empty lines and lines that
@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from protocols.mission_file.error import (
+    NO_HOME,
     MissionFileError,
     Note,
     file_degrees_to_e7,
@@ -42,11 +43,10 @@ _COMMANDS_100 = {
 _INTEGER_FIELDS = {"seq": 65535, "current": 255, "frame": 255, "command": 65535}
 _NUMBER_FIELDS = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude", "autocontinue")
 _FIELD_COUNT = len(_INTEGER_FIELDS) + len(_NUMBER_FIELDS)
-# float() and int() also accept underscores and digits of any script, which no ground station writes.
+# float() and int() also accept underscores and digits of any script, which ground stations do not write.
 _INTEGER = re.compile(r"\d{1,9}", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[-+]?\d+)?|nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 _NO_ITEM_0 = "there is no item 0: home is missing"
-_NO_HOME = "QGC WPL 120 has no home: the craft's position is used, or --home"
 
 
 def has_header(line: str) -> bool:
@@ -108,7 +108,7 @@ def _fields(line: str) -> list[str]:
 def _numbered(items: list[MissionItem], note: Note, *, has_home: bool) -> list[MissionItem]:
     """Number the items by their order, as Mission Planner does."""
     if not has_home or items[0].seq != 0:
-        note(_NO_ITEM_0 if has_home else _NO_HOME)
+        note(_NO_ITEM_0 if has_home else NO_HOME)
         home = replace(items[0], seq=0, command=0, lat_e7=None, lon_e7=None, alt_m=0.0)
         items = [home, *items] if has_home else behind_home(items, home)
     elif items[0].command == 0:
@@ -117,7 +117,7 @@ def _numbered(items: list[MissionItem], note: Note, *, has_home: bool) -> list[M
         items[0] = replace(items[0], command=int(Command.NAV_WAYPOINT), frame=int(Frame.GLOBAL))
     odd = next((place for place, item in enumerate(items) if item.seq != place), None)
     if odd is not None:
-        note(f"item {items[odd].seq} where item {odd} must be: numbered by their order")
+        note(f"item {items[odd].seq} where item {odd} was expected: renumbered by their order")
     return [replace(item, seq=place) for place, item in enumerate(items)]
 
 

@@ -68,7 +68,7 @@ _RANKS = (ExitCode.ACCEPTED, ExitCode.CLEARED, ExitCode.REJECTED, ExitCode.UNREA
     "--home",
     metavar="LAT,LON",
     callback=position,
-    help="The craft's position, and home of a list without it: then item 0 in a relative frame is a waypoint.",
+    help="The craft's position, and home if the list has none: then item 0 in a relative frame is a waypoint.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each file.")
 @click.pass_context
@@ -85,7 +85,7 @@ def check(
     Files: QGC WPL (.waypoints), QGroundControl's .plan, Mission Planner's, INAV Configurator's and mwp's .mission, a
     dump with wp lines, KML, KMZ, GPX, and CSV lists as Litchi writes them.
 
-    Nothing is sent anywhere. Exit code 1: a file would be rejected, 3: one would erase the mission.
+    The files are not sent anywhere. Exit code 1: a file would be rejected, 3: a file would erase the mission.
     """
     try:
         limit_m = takeoff_limit_m()
@@ -116,7 +116,7 @@ def _saved_settings(path: Path, kind: str) -> SavedSettings:
 def _check_file(path: Path, rules: MissionRules, home: tuple[int, int] | None, as_json: bool) -> ExitCode:
     name = shown_path(path)
     try:
-        sent = with_home(load_mission(path), home)
+        sent = with_home(load_mission(path, has_home=home is not None), home)
     except MissionFileError as error:
         if as_json:
             print_json({"file": name, "error": str(error)})

@@ -33,7 +33,7 @@ _TEXT, _NAV = (".waypoints", ".txt", ".plan"), (".mission", ".xml")
     type=click.FloatRange(-32767, 32767),
     help="The altitude above home of all points of a path (KML, GPX or CSV), m.",
 )
-@click.option("--home", metavar="LAT,LON", callback=position, help="Home, for files without it.")
+@click.option("--home", metavar="LAT,LON", callback=position, help="Home, if the file has none.")
 def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, int] | None) -> None:
     """Write the mission in SOURCE to TARGET, in the format that the ending of TARGET names.
 
@@ -44,7 +44,7 @@ def convert(source: Path, target: Path, alt_m: float | None, home: tuple[int, in
     if ending not in (*_TEXT, *_NAV):
         fail(MissionFileError(shown_path(target), "", *Fault.UNKNOWN_ENDING()), UNREADABLE)
     try:
-        items = load_mission(source, alt_m)
+        items = load_mission(source, alt_m, has_home=home is not None)
         if alt_m is not None and any(item.alt_m != alt_m for item in items[1:]):
             raise MissionFileError(shown_path(source), "", *Fault.OWN_ALTITUDES())
         if items[0].command != Command.NAV_WAYPOINT and home is None:

@@ -24,7 +24,7 @@ _STANDARD_OUTPUT = Path("-")
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("--home", metavar="LAT,LON", callback=position, help="Home, for a list without it.")
+@click.option("--home", metavar="LAT,LON", callback=position, help="Home, if the list has none.")
 @click.option("--erase", is_flag=True, help="Erase without asking if no item of the file can be stored.")
 @bridge_options
 def push(client: BridgeClient, file: Path, home: tuple[int, int] | None, erase: bool) -> None:
@@ -34,7 +34,7 @@ def push(client: BridgeClient, file: Path, home: tuple[int, int] | None, erase: 
     not erased.
     """
     try:
-        items = with_home(load_mission(file), home)
+        items = with_home(load_mission(file, has_home=home is not None), home)
     except MissionFileError as error:
         fail(error, UNREADABLE)
     request: Json = {"do": "push", "items": [asdict(item) for item in items], "source": f"push of {file.name}"}

@@ -72,8 +72,8 @@ def noted(*lines: str) -> tuple[list[MissionItem], list[str]]:
 @pytest.mark.parametrize(
     ("lines", "note"),
     [
-        ([HOME, "2" + POINT[1:]], "item 2 where item 1 must be: numbered by their order"),
-        ([HOME, "0" + POINT[1:]], "item 0 where item 1 must be: numbered by their order"),
+        ([HOME, "2" + POINT[1:]], "item 2 where item 1 was expected: renumbered by their order"),
+        ([HOME, "0" + POINT[1:]], "item 0 where item 1 was expected: renumbered by their order"),
         ([HOME.replace("\t0\t16\t", "\t3\t0\t"), POINT], "home has command 0, treated as a WAYPOINT"),
         ([HOME, POINT.removesuffix("\t1")], "line 3: autocontinue is missing"),
         ([HOME.replace("\t", ","), POINT.replace("\t", ", ")], None),
@@ -145,10 +145,10 @@ def test_degrees_are_rounded_to_1e_7(degrees: str, e7: int | None) -> None:
         ([HEADER, HOME, POINT.replace("\t3\t", "\t-1\t")], ["line 3", "frame", "'-1'"]),
         ([HEADER, HOME, POINT.replace("\t3\t", "\t256\t")], ["line 3", "frame", "255"]),
         ([HEADER, "", HOME, "# x", POINT + "\t1"], ["line 5"]),
-        ([HEADER, HOME, POINT.replace("\t16\t", "\t5001\t")], ["holds a fence", "the mission's own file"]),
-        ([HEADER, HOME, POINT.replace("\t16\t", "\t5100\t")], ["holds rally points"]),
-        (["#saved by Mission Planner", "45.383\t8.473", "45.384\t8.474"], ["holds a fence"]),
-        (["RALLY\t45.383\t8.473\t100\t0\t0\t0"], ["holds rally points"]),
+        ([HEADER, HOME, POINT.replace("\t16\t", "\t5001\t")], ["contains a fence", "the mission's own file"]),
+        ([HEADER, HOME, POINT.replace("\t16\t", "\t5100\t")], ["contains rally points"]),
+        (["#saved by Mission Planner", "45.383\t8.473", "45.384\t8.474"], ["contains a fence"]),
+        (["RALLY\t45.383\t8.473\t100\t0\t0\t0"], ["contains rally points"]),
     ],
 )
 def test_a_damaged_file_is_refused_with_the_line(lines: list[str], words: list[str]) -> None:

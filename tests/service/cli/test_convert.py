@@ -35,6 +35,7 @@ def test_a_path_gets_the_altitude_and_home_that_are_given(tmp_path: Path) -> Non
     assert not target.exists()
     done = run(tmp_path, "in.kml", KML, str(target), "--alt", "30", "--home", "51.477,0.001")
     assert done.exit_code == 0, done.output
+    assert "the file has no home" not in done.output
     home, first, _ = read_mission_file(target.read_bytes(), target.name)
     assert (home.lat_e7, home.lon_e7, first.alt_m) == (514770000, 10000, 30)
 
@@ -60,7 +61,7 @@ def test_a_list_without_home_needs_the_option(tmp_path: Path) -> None:
     ("target", "args", "words"),
     [
         ("out.kml", [], "name it .waypoints, .plan or .mission"),
-        ("out.waypoints", ["--alt", "30"], "leave out --alt, which is for a KML, GPX or CSV"),
+        ("out.waypoints", ["--alt", "30"], "omit --alt, which is for a KML, GPX or CSV"),
         ("out.waypoints", ["--home", "91,0"], "is not a position"),
     ],
 )
