@@ -74,7 +74,7 @@ def sent_and_stored(
 ) -> list[ItemRow]:
     """One row per item sent, and one per inserted item. `stored`: empty for a list that was rejected or cleared.
 
-    `sent_seqs`: the number as sent of each stored item; empty: in order.
+    `sent_seqs`: as reports.verdict.SentSeqs.
     A row that differs only in filled-in defaults is "same". Its `changes` still hold their reasons.
     """
     dropped = {finding.seq: finding.why for finding in findings if finding.becomes == DROPPED}

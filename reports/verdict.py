@@ -9,7 +9,9 @@ from typing import Any, Generic, TypeVar
 from protocols.mission_item import MissionItem, MissionRecord, MissionResult
 from reports.finding import Finding, RejectingFinding
 
-#: Item numbers of a list as sent, by the item numbers as read back; None if not sent.
+#: For each item of a list as stored and read back, the item's number as sent, or None if it was inserted (a speed).
+#: Rules drop, insert and merge items. A station that sent a list counts by its own numbers until it reads the list
+#: back, so it is shown those. Empty: the same numbers.
 SentSeqs = tuple[int | None, ...]
 RecordT = TypeVar("RecordT", bound=MissionRecord)
 
@@ -44,8 +46,7 @@ class Verdict(Generic[RecordT]):
 
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
-    interest). `sent_seqs` has, for each of `items`, the number of the item as sent, or None if a speed change was
-    inserted. `flight`: the length, heights and end in words. `path`: the legs, also of a list rejected for them.
+    interest). `flight`: the length, heights and end in words. `path`: the legs, also of a list rejected for them.
     `assumed`: what the rules had to assume about board and craft. `findings` are in the order of the list. That of a
     rejection is the last.
     """

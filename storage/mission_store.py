@@ -42,7 +42,7 @@ class ReceivedMission:
     "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
     MAV_MISSION_ name. stored_items: as the flight controller should hold them. records: the bytes written, of
     `record_count` records. checksum: their CRC-32. roi_commands: the command number that each stored region of
-    interest was sent as, by its seq. sent_seqs: for each stored item, its number as sent, None if it was inserted.
+    interest was sent as, by its seq. sent_seqs: as reports.verdict.SentSeqs.
     """
 
     received_at: float
@@ -83,7 +83,7 @@ class MissionSummary:
 
 @dataclass(frozen=True, slots=True)
 class StoredMission:
-    """A mission as received, and its outcome."""
+    """A mission as received, and the outcome."""
 
     number: int
     received: ReceivedMission
@@ -160,7 +160,7 @@ class MissionStore:
             self._seal(number)
 
     def get(self, number: int) -> StoredMission | None:
-        """The mission with this number, None if there is none; StoreError also if it is corrupt."""
+        """The mission with this number, None if there is none. StoreError also if it is corrupt."""
         summary = self._line(number)
         if summary is None:
             return None

@@ -92,8 +92,7 @@ class DeliveryResult:
 class HeldMission:
     """The flight controller's list, as last read.
 
-    `sent_seqs`: the item numbers of each ground station that sent this list and has not read it since, by
-    Sender.identity. Only of those that count otherwise than `items`. `path`: as it is flown, if that is known.
+    `sent_seqs`: of each ground station that counts by them, by Sender.identity. `path`: as it is flown, if known.
     """
 
     identity: ListIdentity

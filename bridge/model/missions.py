@@ -42,7 +42,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ArrivedMission:
-    """A mission as received: its source as text, the items as sent, and the verdict.
+    """A mission as received: the source as text, the items as sent, and the verdict.
 
     `sender`: Sender.identity of the ground station; empty for other sources. `is_home_meant`: True if item 0 is surely
     home, whatever its frame, asked at the end.
@@ -59,8 +59,8 @@ class ArrivedMission:
 class RecalledMission:
     """The store's facts about a list that was verified before.
 
-    `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: the item numbers of
-    each ground station that sent it and has not read it back since, by Sender.identity.
+    `sent_as`: the commands that ambiguous records were sent with, by record number. `sent_seqs`: of
+    each ground station that counts by them, by Sender.identity.
     """
 
     sent_as: Mapping[int, int] = field(default_factory=dict)
@@ -176,7 +176,7 @@ class FlownMission:
 
 
 class MissionProgress:
-    """Feed it every report. Records count from 1. `number` is 0 while no mission is flown."""
+    """Feed it every report. Records count from 1. `number` is 0 unless a mission is flown."""
 
     def __init__(self) -> None:
         self.number = 0

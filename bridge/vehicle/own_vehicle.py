@@ -36,7 +36,7 @@ from reports.verdict import SentSeqs
 _TICK_S = 1.0
 #: Mission Planner needs two heartbeats to connect: a newcomer gets one every 0.2 s for 3 s.
 _NEWCOMER_S, _NEWCOMER_INTERVAL_S = 3.0, 0.2
-#: Values are unknown without a reading for this long: SYS_STATUS is sent anyway, and no item is shown as flown to.
+#: Values are unknown without a reading for this long: SYS_STATUS is sent anyway, and items are not shown as flown to.
 _SILENT_S = 3.0
 #: Longer than MAVSDK waits for a changed MISSION_CURRENT (2.5 s).
 _NO_CURRENT_S = 4.0
@@ -214,8 +214,8 @@ class OwnVehicle:
     def refuse_current(self, sender: Sender, now: float) -> None:
         """Send MISSION_CURRENT to a ground station whose MISSION_SET_CURRENT was refused, or withhold it.
 
-        Mission Planner's window hangs until one arrives. MAVSDK, which requests no streams, repeats the request at each
-        that has another number, without end.
+        Mission Planner's window hangs until one arrives. MAVSDK, which does not request streams, repeats the request at
+        each that has another number, without end.
         """
         if sender.station.behaviour.streams:
             self.send_once(sender, messages.MAVLINK_MSG_ID_MISSION_CURRENT, now)
@@ -223,7 +223,7 @@ class OwnVehicle:
             self.withhold_current(sender.station, now)
 
     def withhold_current(self, station: GroundStation, now: float) -> None:
-        """Send no MISSION_CURRENT to a ground station until its MISSION_SET_CURRENT is answered."""
+        """Hold MISSION_CURRENT back from a ground station until the MISSION_SET_CURRENT is answered."""
         station.rates.due[messages.MAVLINK_MSG_ID_MISSION_CURRENT] = now + _NO_CURRENT_S
 
     def confirm_current(self, sender: Sender) -> None:
@@ -351,7 +351,7 @@ class OwnVehicle:
             self._ground.outbox.multicast(pack(make.mission_current(self._moment(now, sent_seqs))), stations)
 
     def _by_item_numbers(self, stations: Sequence[GroundStation]) -> Iterable[tuple[SentSeqs, Sequence[GroundStation]]]:
-        """The stations that count the items alike; () stands for the numbers of the list as read back."""
+        """The stations that count the items alike."""
         held = self._missions.on_board
         if held is None or not held.sent_seqs:
             return [((), stations)]
@@ -361,7 +361,7 @@ class OwnVehicle:
         return alike.items()
 
     def sent_seqs(self, station: GroundStation) -> SentSeqs:
-        """The item numbers of a station that sent the list and has not read it since, else ()."""
+        """The station's numbers of the list on board."""
         held = self._missions.on_board
         if held is None or not held.sent_seqs:
             return ()

@@ -98,8 +98,7 @@ def known(value: T | None) -> T:
 class Moment:
     """The vehicle at one moment. now: monotonic s.
 
-    unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the item numbers of the receiver,
-    if they are not those of the list as read back.
+    unix_time_s: the Pi's clock at a monotonic time, None if it is not set. sent_seqs: the receiver's.
     """
 
     vehicle: v.Vehicle
