@@ -102,7 +102,7 @@ class Bridge:
         self._has_only_passed_on = False
         #: The time of the next `tick`, and of the line's own, as of the last `take`.
         self.due = self._line_due = now
-        #: The armed craft as last remembered; it changes rarely.
+        #: The armed craft as last remembered. It changes rarely.
         self._flight = config.flight
         self._was_armed = False
         #: True while an autopilot speaks MAVLink itself: the bridge then does not send anything in its name.

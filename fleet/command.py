@@ -67,7 +67,7 @@ def list_vehicles(as_json: bool, **where: Any) -> None:
 @fleet.command(short_help="Show which vehicles are alive, until Ctrl-C.")
 @address_options
 def watch(**where: Any) -> None:
-    """Show which vehicles are alive and their state, until Ctrl-C: armed ones and problems first."""
+    """Show which vehicles are alive and their state, until Ctrl-C: armed vehicles and problems first."""
     with (
         fleet_session(where) as (session, prefix),
         fleet_session(where) as (second, _),
@@ -94,11 +94,11 @@ def pull_missions(path: Path | None, names: tuple[str, ...], as_json: bool, **wh
     """Read the missions of vehicles' flight controllers: of all that are alive, or of those named.
 
     PATH is a folder, in which each vehicle's mission becomes NAME.waypoints. For one named vehicle it may be a file, or
-    - for standard output. Without it the missions are shown. Exit code 1: one was not read, or cannot be written.
+    - for standard output. Without it the missions are shown. Exit code 1: a mission was not read or cannot be written.
     """
     to_output = path == _STANDARD_OUTPUT
     if to_output and (len(names) != 1 or as_json):
-        raise click.UsageError("standard output takes one mission: name one --vehicle, and omit --json")
+        raise click.UsageError("only one mission fits on standard output: give one --vehicle, and omit --json")
     with fleet_session(where) as (session, prefix):
         bridges = alive(session, prefix)
         held = pull(session, prefix, chosen(bridges, names, prefix), bridges)

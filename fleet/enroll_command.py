@@ -53,7 +53,7 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
         table = f'[zenoh]\nvehicle = "{name}"\nconfig_file = "{enrolled.files[0].name}"'
         click.echo(f"In its configuration file:\n\n{sysid}{table}")
         if not sysid:
-            click.echo(f"\nNo system id is left for it: {len(SYSIDS)} vehicles have one.")
+            click.echo(f"\nAll {len(SYSIDS)} system ids are in use: it does not get one.")
     if way_in.is_tls:
         click.echo(f"\nCertificates: python make_certificates.py {folder} ROUTER_HOST {name} (examples/zenoh-tls)")
     click.echo(f"\nThen restart the router in {fleet.path} with router.json5.")
@@ -73,5 +73,5 @@ def expel(name: str, folder: Path) -> None:
         fleet.expel(name)
     except EnrolmentError as error:
         fail(error)
-    click.echo(f"{name} is expelled.\n\nNow restart the router in {fleet.path} with router.json5.")
+    click.echo(f"{name} has been expelled.\n\nNow restart the router in {fleet.path} with router.json5.")
     click.echo(f"Until then {name}'s sessions continue, and new ones can be opened.")

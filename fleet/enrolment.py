@@ -31,7 +31,7 @@ _ACCEPT_PENDING = 1_000
 _BUFFER_BYTES = 32 << 10
 _LISTEN = ("declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber")
 _SPEAK = ("put", "delete", "declare_queryable", "reply", "liveliness_token")
-#: Verbatim chunks match no wildcard: each needs its own expression.
+#: Wildcards do not match verbatim chunks: each needs a separate expression.
 _EXPRESSIONS = ("**", "**/@adv/**", "@cmd/**", "@mavlink/**")
 _VIEWED = ("*/v1/**", "*/v1/**/@adv/**")
 
@@ -53,12 +53,12 @@ class Role(Enum):
 
 
 class EnrolmentError(Exception):
-    """A member cannot be enrolled or expelled; one sentence."""
+    """A member cannot be enrolled or expelled, in one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """`sysid`: a vehicle's MAVLink system id, which no other vehicle of the fleet has, else None."""
+    """`sysid`: a vehicle's MAVLink system id, unique in the fleet, else None."""
 
     role: Role
     sysid: int | None = None
@@ -66,7 +66,7 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Enrolled:
-    """A new member, and its own files."""
+    """A new member, and the files for it alone."""
 
     member: Member
     files: Sequence[Path]

@@ -110,6 +110,6 @@ def _take(trial: Trial, reply: zenoh.Reply) -> None:
         case "ACCEPTED":
             pass
         case "CLEARED":
-            trial.error = "no item of it can be stored"
+            trial.error = "none of its items can be stored"
         case _:
-            trial.error = findings[-1].text() if findings else "it gives no reason"
+            trial.error = findings[-1].text() if findings else "reason not given"

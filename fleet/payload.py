@@ -14,7 +14,7 @@ from payloads.payload import decoded
 
 
 def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
-    """The object in a payload, JSON or CBOR by its encoding."""
+    """The object in a payload, JSON or CBOR by the encoding."""
     try:
         value = printable(decoded(sample.payload.to_bytes(), str(sample.encoding)))
     except (ValueError, RecursionError, cbor2.CBORError):

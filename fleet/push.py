@@ -93,7 +93,7 @@ class FleetPush:
         """Take an error reply; None: zenoh's own, a timeout."""
         progress = self.vehicles[vehicle]
         if not progress.is_done:
-            progress.error = _TOO_LATE if error is None else text(error, "error") or "it gives no reason"
+            progress.error = _TOO_LATE if error is None else text(error, "error") or "reason not given"
 
     def held(self, vehicle: str, text: str) -> None:
         """Take a vehicle that does not need a push, because it holds the mission already."""
@@ -118,7 +118,7 @@ def push(
 ) -> None:
     """Send the file to all and wait until each is done. `show` is called after every change.
 
-    `staged`: one vehicle first, then each time as many as have it. After a failure no other push is started.
+    `staged`: one vehicle first, then each time as many as have it. After a failure, further pushes are not started.
     """
     show(fleet)
     for stage in stages(fleet.waiting) if staged else [fleet.waiting]:

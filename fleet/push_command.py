@@ -70,8 +70,8 @@ def push_mission(
 ) -> None:
     """Write a mission file to vehicles, each by its own rules, and verify it there.
 
-    A vehicle that fails does not stop the others, unless --staged. Exit code 1: one does not hold it (--dry-run: would
-    not accept it), or did not answer.
+    A vehicle that fails does not stop the others, unless --staged. Exit code 1: a vehicle does not hold it
+    (--dry-run: would not accept it), or did not answer.
     """
     require_choice(names, to_all)
     mission = _read(file)
@@ -98,7 +98,7 @@ def push_mission(
 def verify_mission(file: Path, names: tuple[str, ...], to_all: bool, as_json: bool, **where: Any) -> None:
     """Compare the missions on vehicles with a file, by checksum, as stored under each vehicle's rules.
 
-    Exit code 1: one does not hold it, or did not answer.
+    Exit code 1: a vehicle does not hold it, or did not answer.
     """
     require_choice(names, to_all)
     mission = _read(file)

@@ -50,7 +50,7 @@ def alive(session: zenoh.Session, prefix: str, *more: zenoh.Session) -> set[Brid
             return {bridge for bridge in found if bridge is not None}
     # zenoh's own error, or a pause: a shorter list would be wrong.
     raise FleetError(
-        f"the router did not list the vehicles: nothing for {_TIMEOUT_S:.0f} s; it hangs, or the connection is bad"
+        f"the router did not list the vehicles within {_TIMEOUT_S:.0f} s: it hangs, or the connection is bad"
     )
 
 

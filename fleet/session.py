@@ -26,7 +26,7 @@ _OPEN_TIMEOUT_MS = 3000
 
 
 class FleetError(Exception):
-    """A fleet command failed; one sentence."""
+    """A fleet command failed, in one sentence."""
 
 
 def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -> zenoh.Session:
@@ -37,7 +37,7 @@ def open_session(connect: Sequence[str] = (), config_file: Path | None = None) -
     config = _config(connect, config_file)
     endpoints = connect_endpoints(config)
     if not endpoints:
-        raise FleetError(f"{config_file} names no connect/endpoints: add them, or use --connect")
+        raise FleetError(f"{config_file} lacks connect/endpoints: add them, or use --connect")
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:

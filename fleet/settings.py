@@ -133,7 +133,7 @@ def fleet_settings() -> None:
 def diff_settings(names: tuple[str, ...], as_json: bool, **where: Any) -> None:
     """Show the settings in which vehicles differ: all that are alive, or those named.
 
-    Exit code 1: they differ, or the settings of one are not known.
+    Exit code 1: they differ, or those of a vehicle are not known.
     """
     with fleet_session(where) as (session, prefix):
         held = read_settings(session, prefix, chosen(alive(session, prefix), names, prefix))
@@ -176,8 +176,8 @@ def restore_settings(
 ) -> None:
     """Write the settings of a .param file to vehicles, save them, and verify them there.
 
-    A vehicle that fails does not stop the others, unless --staged. Exit code 1: one does not have them (--dry-run:
-    could not take them).
+    A vehicle that fails does not stop the others, unless --staged. Exit code 1: a vehicle does not have them
+    (--dry-run: could not take them).
     """
     require_choice(names, to_all)
     data = _read(file)

@@ -16,7 +16,7 @@ from payloads.names import ZenohSettingsError, check_name
 
 @dataclass(frozen=True, slots=True, order=True)
 class BridgeId:
-    """A bridge that is alive: the vehicle's name, and zenoh's id of the session, which no two bridges share."""
+    """A bridge that is alive: the vehicle's name, and zenoh's id of the session, unique to a bridge."""
 
     vehicle: str
     session_id: str
@@ -24,7 +24,7 @@ class BridgeId:
 
 @dataclass(frozen=True, slots=True)
 class FleetVehicle:
-    """The known data of one vehicle; None if unknown.
+    """The known data of one vehicle, or None if unknown.
 
     `answers`: True if it was heard. `bridges`: how many use this name, normally 1.
     """

@@ -56,7 +56,7 @@ def read_zenoh_file(path: Path) -> zenoh.Config:
 
 @dataclass(frozen=True, slots=True)
 class TlsFiles:
-    """PEM files as zenoh's `transport/link/tls` names them; None if not given."""
+    """PEM files as zenoh's `transport/link/tls` names them, or None if not given."""
 
     root_ca_certificate: Path | None = None
     connect_certificate: Path | None = None
@@ -124,7 +124,7 @@ def _trouble(endpoint: str, files: TlsFiles) -> str:
 
 
 def _tls_trouble(connection: socket.socket, host: str, files: TlsFiles) -> str:
-    """Continue with TLS as zenoh does; SSLError or OSError also describe the problem."""
+    """Continue with TLS as zenoh does. SSLError or OSError also describe the problem."""
     context = ssl.create_default_context()
     for path in (files.root_ca_certificate, files.connect_certificate, files.connect_private_key):
         if path is not None and not os.access(path, os.R_OK):

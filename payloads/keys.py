@@ -2,8 +2,8 @@
 """Every key of a vehicle, in one table; docs/zenoh.md has the same.
 
 A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
-version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Verbatim
-chunks (@) match no wildcard: a wildcard never sends a command, and a recorder of `fleet/**` does not become a MAVLink
+version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Wildcards
+do not match verbatim chunks (@): they never send a command, and a recorder of `fleet/**` does not become a MAVLink
 ground station.
 """
 

@@ -26,4 +26,4 @@ def check_name(what: str, name: str) -> str:
     if is_plain and len(name) <= _MAX_NAME and _FORBIDDEN.search(name) is None:
         return name
     remedy = f'at most {_MAX_NAME} letters, digits and dashes, as "naze-1"'
-    raise ZenohSettingsError(f"{what} is {name[:_MAX_NAME]!a}: make a name of {remedy}")
+    raise ZenohSettingsError(f"{what} is {name[:_MAX_NAME]!a}: use {remedy}")

@@ -101,7 +101,7 @@ def packed(body: Json) -> bytes:
 
 
 def unpacked(data: bytes) -> Json:
-    """Decode an overview; ValueError or cbor2.CBORError if that is impossible. Unknown numbers are ignored."""
+    """Decode an overview. ValueError or cbor2.CBORError if that is impossible. Unknown numbers are ignored."""
     values = cbor2.loads(data)
     if not isinstance(values, Mapping):
         raise ValueError("an overview is a map")

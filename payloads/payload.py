@@ -33,7 +33,7 @@ def attachment_of(key: ZenohKey) -> str | None:
 
 
 def decoded(data: bytes, encoding: str) -> Any:
-    """The contents of `data`, by the encoding of its sample; ValueError or cbor2.CBORError if it cannot be read."""
+    """The contents of `data`, by the encoding of its sample. ValueError or cbor2.CBORError if it cannot be read."""
     if encoding.startswith(str(zenoh.Encoding.APPLICATION_CBOR)):
         return unpacked(data)
     return json.loads(data)

@@ -31,7 +31,7 @@ def settings_difference(left: SettingValues, right: SettingValues) -> list[Setti
 def setting_values(data: object) -> SettingValues:
     """Read a table of settings from plain data. ValueError gives the reason.
 
-    Left out are settings that are NaN (null), and names that no setting can have.
+    Left out are settings that are NaN (null), and names that settings cannot have.
     """
     if not isinstance(data, dict):
         raise ValueError("settings must be an object")

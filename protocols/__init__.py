@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Converts bytes to typed messages and back. Opens no port, does not read a clock, never sleeps."""
+"""Converts bytes to typed messages and back. Does not open ports, read clocks or sleep."""

@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 class BootLoaderError(Exception):
-    """The boot loader does not answer, or refuses a command; one sentence."""
+    """The boot loader does not answer, or refuses a command, in one sentence."""
 
 
 @dataclass(frozen=True, slots=True)

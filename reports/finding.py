@@ -132,7 +132,7 @@ class RejectingFinding:
 def reject(ack: MissionResult, item: MissionItem, name: str, why: str) -> RejectingFinding:
     """Reject the list because of one item's field `name`."""
     was = getattr(item, name)
-    # NaN means "not given". Findings are stored as JSON, which has no NaN.
+    # NaN means "not given". Findings are stored as JSON, which lacks NaN.
     return RejectingFinding(ack, Finding(item.seq, name, was if was == was else None, REJECTED, why, item.command))
 
 

@@ -109,7 +109,7 @@ def transaction(connection: sqlite3.Connection, failure: str) -> Iterator[None]:
 
 
 def insert(connection: sqlite3.Connection, table: str, row: Mapping[str, object]) -> int:
-    """Insert a row, by column; returns its number."""
+    """Insert a row, by column. Returns its number."""
     marks = ", ".join("?" * len(row))
     cursor = connection.execute(f"INSERT INTO {table} ({', '.join(row)}) VALUES ({marks})", (*row.values(),))  # noqa: S608 - constants
     assert cursor.lastrowid is not None  # an INSERT that did not raise has made a row

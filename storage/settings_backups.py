@@ -52,7 +52,7 @@ class SettingsBackups:
         self._path = path
 
     def add(self, board: str, kind: str, values: SettingValues, taken_at: float, occasion: str) -> int:
-        """Store a table of settings, and drop the oldest; returns its number.
+        """Store a table of settings, and drop the oldest. Returns its number.
 
         A table equal to the board's last backup is not stored again: returns the number of that backup.
         """
@@ -84,7 +84,7 @@ class SettingsBackups:
         return number
 
     def get(self, number: int) -> SettingsBackup | None:
-        """The backup with this number, None if there is none; StoreError also if it is corrupt."""
+        """The backup with this number, None if there is none. StoreError also if it is corrupt."""
         with explained(f"cannot read the settings' backup {number} from {self._path}"):
             row = self._connection.execute(
                 f"SELECT {BACKUP}, crc32 FROM settings_backups WHERE number = ?",  # noqa: S608 - a constant
@@ -123,7 +123,7 @@ class SettingsBackups:
         ]
 
     def _last(self, board: str, kind: str) -> SettingsBackup | None:
-        """The board's last backup; None if there is none or it is damaged: the next is then stored in any case."""
+        """The board's last backup, or None if there is none or it is damaged: the next is then stored in any case."""
         number = self._newest("board = ? AND kind = ?", board, kind)
         try:
             return None if number is None else self.get(number)

@@ -23,7 +23,7 @@ def read_bounded(path: Path, most: int, *, follows_links: bool = True) -> bytes:
 
 
 def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
-    """Open a file to read; OSError also if it is a pipe or a device. Never waits for the other end of a pipe."""
+    """Open a file to read. OSError also if it is a pipe or a device. Never waits for the other end of a pipe."""
     flags = _NONBLOCK if follows_links else _NONBLOCK | os.O_NOFOLLOW
     file = open(path, "rb", opener=lambda name, others: os.open(name, others | flags))  # noqa: SIM115  # the caller's
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

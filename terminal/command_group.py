@@ -32,7 +32,7 @@ class CommandGroup(click.Group):
 
 
 class LazyCommand(NamedTuple):
-    """The location of a command, as "module:name", and its line in the list of commands."""
+    """The location of a command, as "module:name", and the line in the list of commands."""
 
     source: str
     summary: str

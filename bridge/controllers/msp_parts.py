@@ -21,10 +21,10 @@ from protocols.msp.telemetry import decode_box_names
 from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
-_ARM = "the arm switch is set with the board's own configurator, a wrong one could arm"
+_ARM = "set the arm switch with the board's own configurator: a wrong range could arm the craft"
 _PULSE = "disarmed motors get this pulse: set it with the board's own configurator"
-_UNKNOWN = "this firmware's way to set it is not known"
-_HAZARD = "the firmware could take bytes of this change for typed keys: try another value"
+_UNKNOWN = "naze-bridge does not know how this firmware sets it"
+_HAZARD = "the firmware could mistake bytes of this change for typed keys: try another value"
 _FIXED = {"BOX ARM": _ARM, "min command": _PULSE}
 #: Permanent id of the box that arms.
 _ARM_ID = 0
@@ -33,14 +33,14 @@ _LONGEST_RANGES = 80
 
 
 class _Place(NamedTuple):
-    """A setting's handle. place: its field, or the mode's permanent id."""
+    """A setting's handle. place: the field, or the mode's permanent id."""
 
     part: SettingsRequest
     place: Field | int
 
 
 class MspPartSettings(FcSettings):
-    """Some parts of a board's settings. All that its firmware has, if none is named."""
+    """Some parts of a board's settings. All that the firmware has, if none is named."""
 
     def __init__(self, board: FlightController, *parts: SettingsRequest) -> None:
         self._parts = parts or SETTINGS[board.firmware]

@@ -70,7 +70,7 @@ class LegLimits:
 
     def judge(self, _records: Sequence[NavRecord], path: FlownPath, departure: Departure) -> Iterable[Judgement]:
         legs = [leg for leg in path.legs if not leg.is_return]
-        high = f"flown at {self.highest_m} m, its nav_max_altitude"
+        high = f"flown at {self.highest_m} m (nav_max_altitude)"
         too_high = [leg for leg in path.legs if (leg.end_cm or 0) > 100 * self.highest_m]
         yield from first_of([(leg.target, high) for leg in too_high], "alt_m")
         stop = f"leg of {self.stops_at_m} m or more: stops there"
@@ -98,7 +98,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         rth_height=True,
         jumps_back_only=True,
         # It counts milliseconds in 16 bits.
-        longest_hold=Range(0, 65, "it holds at most 65 s"),
+        longest_hold=Range(0, 65, "a hold lasts 65 s at most"),
         ends_on_any_record=False,
         own_rth_landing=True,
     )

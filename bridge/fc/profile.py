@@ -84,7 +84,7 @@ class Interview:
 
 
 class Spoken(Enum):
-    """The protocols that a flight controller may speak. In its command line it answers none of them."""
+    """The protocols that a flight controller may speak. In the command line it does not answer them."""
 
     MSP = "MSP"
     MAVLINK = "MAVLink"
@@ -138,13 +138,13 @@ class Profile:
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
     fences, rally: its stores of fences and of rally points.
-    settings: how its own settings are read and changed; None if not over this protocol.
+    settings: how its own settings are read and changed, or None if not over this protocol.
     check_kind, rules: how `naze-bridge check --kind` calls it, and the rules it applies.
     mavlink_readings: the meaning of its MAVLink messages.
     mavlink_sender: MAVLink version, sysid and compid it sends with; None matches any.
     restarts_after_calibration: it reboots by itself when a calibration is done. calibrates_six_positions: its
     accelerometer needs one request in each of six positions.
-    arming_blockers: the known reasons that prevent arming at a time; None if not heard yet.
+    arming_blockers: the known reasons that prevent arming at a time, or None if not heard yet.
     """
 
     name: str

@@ -48,7 +48,7 @@ T = TypeVar("T")
 
 
 class FlashingError(Exception):
-    """The flash cannot be read or written; one sentence."""
+    """The flash cannot be read or written, in one sentence."""
 
 
 def find_chip(within_s: float, is_waiting: Callable[[], None]) -> Dialogue[None]:
@@ -136,7 +136,7 @@ def _page(contents: bytes, page: int) -> bytes:
 
 
 class CommandLineError(Exception):
-    """The command line cannot be used; one sentence."""
+    """The command line cannot be used, in one sentence."""
 
 
 def read_dump() -> Dialogue[str]:

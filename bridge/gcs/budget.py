@@ -84,7 +84,7 @@ class TokenBucket:
         self._used += amount
 
     def take(self, now: float) -> bool:
-        """Count one; False if it exceeds the limit. As `has` and `spend`, which would be two calls for each frame."""
+        """Count one. False if it exceeds the limit. As `has` and `spend`, which would be two calls for each frame."""
         used = max(0.0, self._used - max(0.0, now - self._counted_at) * self._rate.per_s)
         self._counted_at = now
         is_allowed = used + 1.0 <= self._rate.burst
@@ -93,7 +93,7 @@ class TokenBucket:
 
 
 class Budget:
-    """The limits of one address, for all of its stations."""
+    """The limits of one address, for all stations there."""
 
     def __init__(self, totals: dict[Cost, TokenBucket]) -> None:
         self._totals = totals

@@ -41,7 +41,7 @@ _RESTARTED_S = 1.0
 
 
 class Outbox:
-    """Frames to be sent to ground stations. `recorded`: for the telemetry log, each once; None if there is no log."""
+    """Frames to be sent to ground stations. `recorded`: for the telemetry log, each once, or None without a log."""
 
     def __init__(self, emit: Emit, *, is_recorded: bool = False) -> None:
         self._emit = emit
@@ -98,7 +98,7 @@ class Outbox:
         """Send the heartbeat in MAVLink 2, then in MAVLink 1 too, to stations that have not sent MAVLink 2.
 
         QGroundControl talks to the vehicle in the version of the first frame that it gets, and a ground station that
-        knows only MAVLink 1 would not see the vehicle otherwise. Signed links need no MAVLink 1.
+        knows only MAVLink 1 would not see the vehicle otherwise. Signed links do not need MAVLink 1.
         """
         packed, packed_for_qgc = pack(heartbeat), pack(for_qgc)
         self.heartbeat = ids, packed
@@ -275,7 +275,7 @@ class GroundStation:
     # Rights and limits.
 
     def refusal(self, frame: MavlinkFrame, effect: Effect) -> FrameRefusal | None:
-        """The reason for refusing a frame with this effect; None if it is accepted. Every frame passes here first."""
+        """The reason for refusing a frame with this effect, or None if it is accepted. All frames pass here first."""
         # Read requests are also checked: each valid one invalidates older recordings.
         check = Check.VALID if self.signed is None else self.signed.check(frame)
         if check is Check.EARLY and self.has_key:
@@ -313,7 +313,7 @@ class GroundStation:
         )
 
     def heard(self, frame: MavlinkFrame, ids: tuple[int, int], now: float) -> Sender:
-        """Note a frame; returns the sender."""
+        """Note a frame. Returns the sender."""
         self.is_back = now >= self.heard_at + _RETURNS_S
         if not self.is_heard:
             self.is_heard, self.came_at = True, now

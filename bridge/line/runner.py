@@ -134,7 +134,7 @@ class Runner:
         task = self._interruptible
         if task is not None and now >= task.ends_at:
             task.ends_at = inf
-            self.advance(OutOfTime("the limit has passed"), now)
+            self.advance(OutOfTime("the time limit has passed"), now)
             return
         if task is not None and isinstance(self._awaited, Receive) and self._link is not None:
             # The link may have delayed the request, or received other replies first.

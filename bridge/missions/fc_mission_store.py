@@ -131,7 +131,7 @@ class FcMissionStore(ABC, Generic[RecordT]):
         return True
 
     def why_stopped(self, place: Place) -> str:
-        """What may have stopped a mission at this place; empty if unknown."""
+        """What may have stopped a mission at this place, or empty if unknown."""
         return ""
 
     def settings_changed(self) -> None:

@@ -188,7 +188,7 @@ class HomeOnly(ListCheck):
         return CLEARED_LIST
 
 
-_HOME_ONLY = reject_list(MissionResult.INVALID, 1, "only a home point, no command")
+_HOME_ONLY = reject_list(MissionResult.INVALID, 1, "only home, without a command")
 
 
 class MissionRules(Protocol):
@@ -274,7 +274,7 @@ def refuse_position(item: MissionItem) -> RejectingFinding | None:
 
 
 def missing_coordinate(item: MissionItem) -> tuple[str, int | None] | None:
-    """The missing coordinate: its field name and the value in its place, or None if both are given."""
+    """The missing coordinate: the field name and the value in place of it, or None if both are given."""
     if item.lat_e7 and item.lon_e7:
         return None
     return ("lon_e7", item.lon_e7) if item.lat_e7 else ("lat_e7", item.lat_e7)

@@ -64,7 +64,7 @@ class FcFound(BridgeEvent):
 
 
 class FcInCommandLine(BridgeEvent):
-    """The flight controller is in its command line, and unusable until the pilot types `exit` there."""
+    """The flight controller is in the command line, and unusable until the pilot types `exit` there."""
 
     name_in_log = "fc.in_command_line"
     level: Level = "warning"

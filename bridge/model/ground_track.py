@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distances between places, and the course over ground for receivers that report a speed but no course."""
+"""Distances between places, and the course over ground for receivers that report a speed without a course."""
 
 import math
 from dataclasses import dataclass

@@ -30,10 +30,10 @@ class ValueKind(Enum):
 class BoardSetting:
     """A setting with the value that the board holds in RAM.
 
-    name: as in the board's command line, or made from its MSP layout if it has no such name. minimum, maximum: of a
+    name: as in the board's command line, or made from the MSP layout if that lacks the name. minimum, maximum: of a
     number; of a text its lengths. choices: names of the values from `minimum` on. fixed: the reason why it cannot be
-    set over the air; empty if it can. raised: the same for a higher value. handle: what its FcSettings needs to change
-    it.
+    set over the air, or empty if it can. raised: the same for a higher value. handle: for FcSettings,
+    to change it.
     """
 
     name: str
@@ -117,7 +117,7 @@ class SettingTable:
 
 
 def table_of(*settings: BoardSetting, is_complete: bool = True) -> SettingTable:
-    """Without those whose names no ground station or file could take."""
+    """Without those whose names would not fit into a ground station or file."""
     return SettingTable({each.name: each for each in settings if is_setting_name(each.name)}, is_complete)
 
 

@@ -2,7 +2,7 @@
 """The flight controller's settings for all clients: read, watched for changes without the bridge, changed and saved.
 
 They are read when the board is found, or when a client asks if reading disturbs the board, and again once a minute and
-after each change; only while it is disarmed and no mission needs the line. A reading without changes costs a few
+after each change; only while it is disarmed and missions do not need the line. A reading without changes costs a few
 requests. Changes are in the board's RAM until they are saved.
 """
 

@@ -82,7 +82,7 @@ def plan_restore(
     if not wanted.keys() & table.settings.keys():
         return SettingRefusal(Cause.REFUSED, sentences.NONE_OF_THESE())
     is_other = source not in ("", board)
-    notice = f"The settings are from {source}, the board has {board}: some may mean something else there"
+    notice = f"The settings are from {source}, but the board has {board}: some may have another meaning there"
     return RestorePlan(tuple(changes), tuple(left_out), notice if is_other else "")
 
 
@@ -205,7 +205,7 @@ _Steps = Generator[_Step, Any, RestoreResult | SettingRefusal]
 
 
 def _restore(settings: BoardSettings, make_plan: _Step, client: str, progress: Callable[[int], None]) -> _Steps:
-    """One restore. client: its name in the log."""
+    """One restore. client: the name in the log."""
     plan: RestorePlan | SettingRefusal = yield make_plan
     if isinstance(plan, SettingRefusal):
         return plan
@@ -220,7 +220,7 @@ def _restore(settings: BoardSettings, make_plan: _Step, client: str, progress: C
             return ended(f"Nothing written: {why}")
         written = f"{len(changed)} of {len(plan.changes)} settings were changed in the board's memory"
         names = _listed([change.name for change in changed])
-        go_back = "to return to the saved settings, switch its power off and on"
+        go_back = "to return to the saved settings, switch the board off and on"
         return ended(f"Nothing saved: {why}. {written} ({names}): {go_back}")
 
     def missed(table: SettingTable | SettingRefusal) -> str:
@@ -255,10 +255,10 @@ def _restore(settings: BoardSettings, make_plan: _Step, client: str, progress: C
         return stopped(f"the save failed ({refused.text})")
     if isinstance(refused, SettingRefusal):
         # Also if the firmware has corrected a value after the save.
-        return ended(f"Not known to be saved: {refused.text}. The board has its old or its new settings")
+        return ended(f"Perhaps not saved: {refused.text}. The board has the old or the new settings")
     table: SettingTable | SettingRefusal = yield read_again
     if isinstance(table, SettingRefusal) or not settings.is_checked:
-        return ended(f"{_count(changed)} saved, but they could not be read again: compare them later")
+        return ended(f"{_count(changed)} saved, but they could not be read back: compare them later")
     if why := missed(table):
         return ended(f"Saved, but now {why}")
     more = f", {len(left_out)} left out" if left_out else ""

@@ -123,7 +123,7 @@ class Parameters:
         #: The values that stations know, once one has read them.
         self._told: dict[str, float] = {}
         self._dialogues: WeakKeyDictionary[Sender, _Dialogue] = WeakKeyDictionary()
-        #: The time of the next `tick`, or infinity while no list is sent.
+        #: The time of the next `tick`, or infinity unless a list is being sent.
         self.due = inf
         #: True if the last PARAM_SET was refused: Mission Planner then asks for a save all the same.
         self.was_refused = False

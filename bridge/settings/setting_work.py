@@ -52,7 +52,7 @@ TRANSITIONS: Mapping[WorkState, Mapping[WorkEvent, WorkState]] = {
 
 @dataclass(eq=False)
 class SettingWork(ABC):
-    """One item. client: its name in the log."""
+    """One item. client: the name in the log."""
 
     client: str
     on_done: OnDone

@@ -2,8 +2,8 @@
 """Answers MSP requests of other programs, from the last replies to the bridge itself or from the flight controller.
 
 A known reply does not use the line, so it is given in flight and during a mission transfer, too. The others are
-requested one at a time, for each program in turn, by a disarmed craft only, and when no poll is due. They use the part
-of the line that telemetry leaves, while no mission needs it. A request that cannot be answered yet waits. After 3 s the
+requested one at a time, for each program in turn, by a disarmed craft only, and between polls. They use the part
+of the line that telemetry leaves, unless a mission needs it. A request that cannot be answered yet waits. After 3 s the
 program is disconnected, because programs misread MSP's error reply: INAV Configurator mistakes it for success.
 """
 
@@ -30,7 +30,7 @@ from protocols.rights.msp import MSP_RIGHTS, MspRight, msp_right
 
 #: For this long a reply also answers the same request of other programs.
 _CURRENT_S = 0.2
-#: An unanswered request occupies the line longer than any other: then no program uses it for a while.
+#: An unanswered request occupies the line longer than any other: then programs may not use it for a while.
 _PAUSE_AFTER_LOSS_S = 0.5
 #: The interval at which waiting requests are checked on an idle line.
 _LOOK_AGAIN_S = 0.1
@@ -69,7 +69,7 @@ class WaitingRequest:
 
 @dataclass(eq=False)
 class Program:
-    """A connected program. `name`: its address, `host`: the part of it without the port.
+    """A connected program. `name`: the address, `host`: the part without the port.
 
     `send` carries a frame to it, `close` ends the connection. `may_write`: it may change something on the flight
     controller.
@@ -118,7 +118,7 @@ class MspSharing:
     _stopped: bool = False
     _reports: TokenBucket = field(default_factory=partial(TokenBucket, _REPORTS))
     refused: Counter[str] = field(default_factory=Counter)
-    #: The time of the next `tick`, or infinity while no request waits.
+    #: The time of the next `tick`, or infinity without waiting requests.
     due: float = inf
 
     def join(self, program: Program) -> None:
@@ -213,7 +213,7 @@ class MspSharing:
             return
 
     def _obstacle(self) -> str:
-        """The reason why no request can be forwarded now, or empty if it can."""
+        """The reason why requests cannot be forwarded now, or empty if it can."""
         state = self._session.state
         if state.link is None or state.controller is None:
             return "no flight controller speaks MSP now"

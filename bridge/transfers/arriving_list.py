@@ -75,7 +75,7 @@ class ItemRequest:
         return self._unanswered[seq] >= 0
 
     def answered(self, seq: int, now: float) -> bool:
-        """Update the timeout when an item arrives for the first time since it was requested; False if it was not."""
+        """Update the timeout when an item arrives for the first time since it was requested. False if it was not."""
         missing = self._unanswered[seq] = self._unanswered.get(seq, 0) - 1
         if seq != self.seq:
             return missing >= 0

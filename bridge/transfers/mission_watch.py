@@ -14,7 +14,7 @@ from bridge.voice.happening import Happening
 
 
 class MissionWatch:
-    """Checks at the store's interval while no transfer runs. After a check that took longer, at once."""
+    """Checks at the store's interval between transfers. After a check that took longer, at once."""
 
     def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions

@@ -36,7 +36,7 @@ class UploadAnswers:
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
         self._again: list[tuple[Sender, FinalAck]] = []
-        #: The time of the next `tick`, or infinity if no answer is due.
+        #: The time of the next `tick`, or infinity without a due answer.
         self.due = inf
 
     # At the end of an upload.

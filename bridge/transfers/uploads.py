@@ -76,7 +76,7 @@ class MissionUploads:
         #: In the order of their MISSION_COUNT.
         self._uploads: list[Upload] = []
         self.answers = UploadAnswers(ground, missions.mission_type)
-        #: The time of the next `tick`, or infinity if there is no upload, and no answer to repeat.
+        #: The time of the next `tick`, or infinity without an upload or an answer to repeat.
         self.due = inf
 
     @property
@@ -172,7 +172,7 @@ class MissionUploads:
         """The ground station reads the mission: its silent upload ends without an ack, which it would misunderstand."""
         for upload in [*self._uploads]:
             if upload.sender == sender and now >= upload.heard_at + _SILENT_S:
-                self._handle(upload, Replaced("the station reads the mission"), now)
+                self._handle(upload, Replaced("the station is reading the mission"), now)
 
     # From the rest of the bridge.
 

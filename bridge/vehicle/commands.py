@@ -56,7 +56,7 @@ _REFUSED: Mapping[int, Sentence[()]] = {
     messages.MAV_CMD_DO_SET_SERVO: sentences.OUTPUTS,
     messages.MAV_CMD_DO_FENCE_ENABLE: sentences.NO_FENCE,
 }
-#: A ground station itself asks for these, and no pilot waits for the answer.
+#: A ground station itself asks for these, and pilots do not wait for the answer.
 _ASKED_BY_PROGRAMS = ("REQUEST_", "GET_", "SET_MESSAGE_INTERVAL")
 #: Those that would start or move a mission flight.
 _OF_A_MISSION = frozenset((messages.MAV_CMD_MISSION_START, messages.MAV_CMD_DO_SET_MISSION_CURRENT))
@@ -203,7 +203,7 @@ class CommandService:
             self.tell(sender, of_mission or _REFUSED[command]())
 
     def tell(self, sender: Sender, why: Happening) -> None:
-        """Give the reason why a button has no effect, which is another one without a flight controller."""
+        """Give the reason why a button is without effect, which differs without a flight controller."""
         sender.say(why if self._vehicle.readiness.has_board else sentences.NO_BOARD_TO_COMMAND())
 
     def _mission_refusal(self) -> Happening | None:

@@ -125,7 +125,7 @@ class Incoming:
         for frame in frames:
             ids, target, msgid = frame.sender, frame.target, frame.msgid
             if ids == self._ids:
-                # Own frames, which have no such target, come back from a broadcast, or from a router that floods.
+                # Own frames, which lack such a target, come back from a broadcast, or from a router that floods.
                 if target[0] == ids[0]:
                     self._ignore(OWN_IDS, station, frame)
                 continue
@@ -250,7 +250,7 @@ class Incoming:
                 self._commands.refuse(sender, m.MAV_CMD_NAV_WAYPOINT)
                 sender.mission_ack(MissionResult.DENIED)
             else:
-                # Messages about no list have the type of missions.
+                # Messages that are not about a list have the type of missions.
                 (of_type.handlers.get(msgid) or handler)(sender, message, now)
         elif msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST and of_type is not None:
             # Mission Planner ignores a refusal, and times out after 5 s.

@@ -29,7 +29,7 @@ _LOST_S = 3.0
 _NOT_FOUND_S = 10.0
 #: Mission Planner shows a text for 10 s.
 _LOST_AGAIN_S = 9.0
-#: While no flight controller was ever found, it cannot be in the air. Reasons not to arm are repeated as often.
+#: Until a flight controller is found, it cannot be in the air. Reasons not to arm are repeated as often.
 _RENEWED_S = 30.0
 _CALIBRATING = Refusal(MissionResult.DENIED, sentences.CALIBRATING_NOW())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The table: every sentence for pilots, with its severity, its short form for a HUD, and the longest values.
+"""The table: every sentence for pilots, with the severity, a short form for a HUD, and the longest values.
 
 The mission rules' findings are values here: `reports.finding` has their texts, `mission_report` the summary.
 """
@@ -52,7 +52,7 @@ ORIGIN = Sentence(_ERROR, "The origin is home, set by the flight controller")
 #: The name comes last: QGroundControl shows a text that begins with "preflight" as a failed check.
 NO_EFFECT = Sentence(_ERROR, "Not supported: {}", "COMPONENT_CONTROL_OF_A_LONG_NAME")
 NO_FENCE = Sentence(_ERROR, "This flight controller has no fence")
-FENCE_SWITCH = Sentence(_ERROR, "Switch geozones in INAV's own settings")
+FENCE_SWITCH = Sentence(_ERROR, "Switch geozones on or off in INAV's settings")
 
 # Set WP.
 NOT_SET_TO_ITEM = Sentence(_ERROR, "Set WP: not possible on this flight controller")
@@ -74,11 +74,11 @@ SET_BY_ANOTHER = Sentence(_NOTICE, "Another ground station has set the waypoint"
 # Calibration. Mission Planner's page waits for "calibration failed" or "calibration successful".
 CALIBRATING_ACCELEROMETER = Sentence(_NOTICE, "Keep the craft level and still")
 CALIBRATING_COMPASS = Sentence(_NOTICE, "Turn the craft about all axes")
-RESTARTS_AFTERWARDS = Sentence(_NOTICE, "Calibrating: it restarts when done (up to 5 min)")
+RESTARTS_AFTERWARDS = Sentence(_NOTICE, "Calibrating: the board then reboots (up to 5 min)")
 CALIBRATING_NOW = Sentence(_ERROR, "Calibrating: try again when it is done")
 CALIBRATED = Sentence(_NOTICE, "{} calibration successful", "Compass")
 NOT_CALIBRATED = Sentence(_ERROR, "{} calibration failed: {}", "Compass", "use INAV Configurator")
-NOT_CANCELLED = Sentence(_ERROR, "Not cancelled: wait, or power the craft off")
+NOT_CANCELLED = Sentence(_ERROR, "Cannot be cancelled: wait, or power off the craft")
 
 # Settings.
 SETTINGS_SAVED = Sentence(_INFO, "Settings saved")
@@ -94,16 +94,16 @@ SETTINGS_CHANGED = Sentence(
 SETTINGS_ARMED = Sentence(_ERROR, "Armed: disarm to change settings")
 SETTINGS_UNANSWERED = Sentence(_ERROR, "No answer from the board: read the settings again")
 LIST_UNANSWERED = Sentence(_INFO, "No answer from the board: read the settings again")
-BOARD_LIMITS_SAVES = Sentence(_ERROR, "The board limits flash wear: one save in 5 minutes")
+BOARD_LIMITS_SAVES = Sentence(_ERROR, "The board limits flash wear: one save every 5 min")
 SETTINGS_BUSY = Sentence(_ERROR, "The board is writing its settings: try again")
 SETTINGS_NOT_SAVED = Sentence(_ERROR, "Not saved by the board: read the settings again")
-VALUE_NOT_TAKEN = Sentence(_ERROR, "The flight controller did not take the value")
+VALUE_NOT_TAKEN = Sentence(_ERROR, "The flight controller did not accept the value")
 NO_SETTINGS = Sentence(_ERROR, "This flight controller's settings cannot be read")
 SETTINGS_OCCUPIED = Sentence(_ERROR, "A mission is being transferred: try again later")
 SETTINGS_UNREAD = Sentence(_ERROR, "The settings are still being read: try again")
 TOO_MANY_CHANGES = Sentence(_ERROR, "Too many changes at once: try again")
 NO_ARM_FLAG = Sentence(_ERROR, "Not changed: the board does not report arming")
-RESTORE_RUNS = Sentence(_ERROR, "Another restore is running: wait for its end")
+RESTORE_RUNS = Sentence(_ERROR, "Another restore is running: wait until it ends")
 NO_SUCH_SETTING = Sentence(_ERROR, "There is no setting {}", _PARAMETER)
 READ_ONLY = Sentence(_ERROR, "{} is read-only", _PARAMETER)
 REFUSED_BY_BOARD = Sentence(_ERROR, "{} stays {}: refused", _PARAMETER, _VALUE)
@@ -134,7 +134,7 @@ ARMED_AND_UNKNOWN = Sentence(_ERROR, "Armed, mission not known: disarm to read i
 VEHICLE_UNKNOWN = Sentence(_ERROR, "The mission on board is not known yet: try again")
 NO_MISSIONS = Sentence(_ERROR, "This flight controller cannot store missions")
 NOT_PATCHED = Sentence(_ERROR, "This Harakiri lacks the mission patch")
-SPEAKS_MAVLINK = Sentence(_ERROR, "Write its missions from a ground station")
+SPEAKS_MAVLINK = Sentence(_ERROR, "Write missions to it from a ground station")
 NO_PLACES = Sentence(_ERROR, "Fences and rally points are not stored here")
 ONLY_MISSIONS = Sentence(_INFO, "Fences and rally points are not stored here")
 TOO_MANY_UPLOADS = Sentence(_ERROR, "Too many uploads: wait a few seconds")
@@ -144,7 +144,7 @@ WOULD_ERASE = Sentence(_ERROR, "No item can be stored: it would erase the missio
 REJECTED = Sentence(_ERROR, "{}", _REASON, lasts=True)
 
 # Missions: uploads that ended early.
-UPLOAD_SILENT = Sentence(_ERROR, "Upload silent for {:.0f} s, old mission kept", 99.0, lasts=True)
+UPLOAD_SILENT = Sentence(_ERROR, "Upload stalled for {:.0f} s, old mission kept", 99.0, lasts=True)
 ITEMS_MISSING = Sentence(_ERROR, "Mission NOT written: {} of {} missing, use Write", 999, 999, lasts=True)
 MESSAGES_LOST = Sentence(_ERROR, "Mission NOT written: messages lost, use Write", lasts=True)
 CANCELLED = Sentence(_ERROR, "Upload cancelled, old mission kept")
@@ -153,7 +153,7 @@ DISCONNECTED = Sentence(_ERROR, "Upload ended: disconnected, old mission kept")
 BRIDGE_STOPS = Sentence(_ERROR, "Upload ended: naze-bridge stops, old mission kept", lasts=True)
 LOST_DURING_UPLOAD = Sentence(_ERROR, "Flight controller lost during the upload", lasts=True)
 STILL_WRITING = Sentence(_ERROR, "Still writing the mission: wait for the result", lasts=True)
-SUPERSEDED = Sentence(_ERROR, "superseded: {}", "the station reads the mission")
+SUPERSEDED = Sentence(_ERROR, "superseded: {}", "the station is reading the mission")
 
 # Missions: writes that failed.
 ARMED_BEFORE = Sentence(_ERROR, "Not written: armed, disarm first")
@@ -166,12 +166,12 @@ FLASH_FAILED = Sentence(_ERROR, "Not written: flash failed, old mission kept", l
 WRITE_UNANSWERED = Sentence(_ERROR, "No answer, old mission kept: write it again", lasts=True)
 OUT_OF_TIME = Sentence(_ERROR, "Not written in time, old one kept: check wiring", lasts=True)
 STOPPED_WHILE_WRITING = Sentence(_ERROR, "Not written: naze-bridge stopped, old one kept", lasts=True)
-UNCERTAIN = Sentence(_ERROR, "Link lost while writing: checked when it is back", lasts=True)
+UNCERTAIN = Sentence(_ERROR, "Link lost while writing: will check on reconnect", lasts=True)
 INCOMPLETE = Sentence(_ERROR, "Interrupted, no mission on board: write it again", lasts=True)
 ARMED_WHILE_WRITING = Sentence(_ERROR, "Armed while writing, no mission on board: disarm", lasts=True)
 NOT_SAVED = Sentence(_ERROR, "Mission not saved, lost at power-off: write again", lasts=True)
 PLACES_KEPT = Sentence(_ERROR, "not written, old kept: try again", lasts=True)
-PLACES_PARTLY = Sentence(_ERROR, "in part, not saved: try again", lasts=True)
+PLACES_PARTLY = Sentence(_ERROR, "partly written, not saved: try again", lasts=True)
 PLACES_NOT_SAVED = Sentence(_ERROR, "lost at power-off: try again", lasts=True)
 PLACES_FAILED = Sentence(_ERROR, "{}: {}", "Rally points", PLACES_KEPT.text, lasts=True)
 
@@ -179,7 +179,7 @@ PLACES_FAILED = Sentence(_ERROR, "{}: {}", "Rally points", PLACES_KEPT.text, las
 STORED = Sentence(_INFO, "{}", _SUMMARY)
 STORED_WITH_LOSSES = Sentence(_WARNING, "{}", _SUMMARY, lasts=True)
 CLEARED = Sentence(_WARNING, "Mission on the flight controller cleared", lasts=True)
-ALREADY_CLEAR = Sentence(_INFO, "The flight controller already held no mission")
+ALREADY_CLEAR = Sentence(_INFO, "No mission to clear on the flight controller")
 DANGER = Sentence(_WARNING, "{}", _REASON)
 CHANGED_ITEM = Sentence(_NOTICE, "{}", _REASON)
 ROUNDED_ITEM = Sentence(_INFO, "{}", _REASON)
@@ -189,7 +189,7 @@ PLACES_STORED_WITH_LOSSES = Sentence(
     _WARNING, "{} verified: {} items{}, warnings: {}", "Rally points", 127, "", 127, lasts=True
 )
 PLACES_CLEARED = Sentence(_INFO, "{} cleared{}", "Rally points", ", unchanged")
-PART_OF_LAST = Sentence(_INFO, "The whole mission before: see Missions on the page, or missions restore")
+PART_OF_LAST = Sentence(_INFO, "The previous whole mission: see Missions on the page, or missions restore")
 EMPTY_PLAN = Sentence(_WARNING, "Plan without waypoints: fences are not stored here")
 NO_LIST = Sentence(_INFO, "No mission to read: {}", _REASON)
 NOT_STORED_ON_PI = Sentence(_WARNING, "The mission could not be stored on the Pi")
@@ -223,25 +223,25 @@ _FLIGHT_TEXTS: Mapping[FlightReason, str] = {
     FlightReason.LIST_DAMAGED: "Mission refused: the list is damaged",
     FlightReason.LIST_CHANGED: "Mission refused: list changed since arming",
     FlightReason.BAD_ORDER: "Mission refused: wrong command or order",
-    FlightReason.BAD_PLACE: "Mission refused: a place is missing",
-    FlightReason.FIRST_FAR: "Mission refused: the first place is too far",
+    FlightReason.BAD_PLACE: "Mission refused: a position is missing",
+    FlightReason.FIRST_FAR: "Mission refused: first waypoint is too far away",
     FlightReason.LEG_LONG: "Mission refused: a leg is too long",
     FlightReason.TOO_HIGH: "Mission refused: an altitude is too high",
     FlightReason.ON_GROUND: "Mission refused: below 1 m it needs TAKEOFF first",
-    FlightReason.THROTTLE_LOW: "Mission stopped: throttle not in the middle",
+    FlightReason.THROTTLE_LOW: "Mission stopped: throttle not centred",
     FlightReason.NO_LIFT: "Mission stopped: the craft did not lift off",
     FlightReason.CLIMB_SLOW: "Mission stopped: the climb took too long",
     FlightReason.STALLED: "Mission stopped: too slow against the wind",
     FlightReason.TURN_SLOW: "Mission stopped: the craft did not turn",
     FlightReason.LAND_SLOW: "Landing takes too long",
-    FlightReason.STICKS: "Mission stopped: roll or pitch stick",
-    FlightReason.THROTTLE: "Mission stopped: throttle stick",
+    FlightReason.STICKS: "Mission stopped: roll or pitch stick moved",
+    FlightReason.THROTTLE: "Mission stopped: throttle stick moved",
     FlightReason.FIX_LOST: "Mission stopped: GPS fix lost, fly by hand",
     FlightReason.RTL: "Mission ended: return to launch",
     FlightReason.FAILSAFE: "Mission ended: failsafe",
     FlightReason.AWAY: "Mission stopped: off course, compass or GPS wrong",
     FlightReason.COMPASS: "Mission stopped: the compass is wrong",
-    FlightReason.HOLD_LOST: "Landing: it cannot hold its place",
+    FlightReason.HOLD_LOST: "Landing: it cannot hold position",
     FlightReason.BLIND: "Landing: no GPS fix for too long",
     FlightReason.FENCE: "Mission stopped: outside mission_radius or _height",
     FlightReason.BATTERY: "Mission ended: battery low",
@@ -280,6 +280,6 @@ def prearm_lines(reasons: tuple[str, ...]) -> list[Happening]:
 
 
 def table() -> dict[str, Sentence[*tuple[object, ...]]]:
-    """Every sentence by its name here."""
+    """Every sentence by the name here."""
     named = {name: value for name, value in globals().items() if isinstance(value, Sentence)}
     return {**named, **{f"FLIGHT_{reason.name}": sentence for reason, sentence in _FLIGHT.items()}}

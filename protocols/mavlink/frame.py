@@ -150,7 +150,7 @@ class MavlinkSplitter:
     most 279 following bytes. Frames inside an incomplete frame are not returned: a log downloaded over MAVLink contains
     whole frames as data.
 
-    A signature has no CRC. If part of it is missing, the next frame starts inside it, so it is scanned like noise.
+    Signatures lack a CRC. If part of it is missing, the next frame starts inside it, so it is scanned like noise.
     """
 
     def __init__(self) -> None:
@@ -173,7 +173,7 @@ class MavlinkSplitter:
     def split(self, data: bytes, *, is_end: bool = False) -> list[bytes]:
         """Like feed, for frames that are only forwarded.
 
-        One loop, with no call per frame except the CRC's: this is the main cost of forwarding a frame.
+        One loop, without a call per frame except the CRC's: this is the main cost of forwarding a frame.
         """
         data = self._buffer + data
         frames: list[bytes] = []

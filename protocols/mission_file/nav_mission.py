@@ -27,7 +27,7 @@ _WP_NUMBERS = re.compile(r"\s*wp(?:\s+-?\d{1,10})+\s*", re.ASCII | re.IGNORECASE
 _ACTIONS = {int(action): action.name for action in NavAction}
 _NAMED_ACTIONS = ", ".join(f"{name} ({number})" for number, name in _ACTIONS.items())
 _INT16, _INT32 = 2**15 - 1, 2**31 - 1
-#: The fields of a `wp` line after the number; INAV before 2.0 had no p2 and p3.
+#: The fields of a `wp` line after the number; INAV before 2.0 lacked p2 and p3.
 _PLACE = ("action", "lat_e7", "lon_e7", "alt_cm")
 _WP_FIELDS = {8: (*_PLACE, "p1", "p2", "p3", "flag"), 6: (*_PLACE, "p1", "flag")}
 

@@ -53,7 +53,7 @@ def parse_xml(text: str, name: str) -> Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise MissionFileError(name, "", *Fault.DOCUMENT_TYPE())
     try:
-        root = fromstring(text.lstrip())  # noqa: S314 - without a document type it has no entities
+        root = fromstring(text.lstrip())  # noqa: S314 - without a document type it cannot have entities
     except ParseError as error:
         line, _ = error.position
         raise MissionFileError(name, f"line {line}", *Fault.DAMAGED_FILE(kind="XML")) from None
@@ -131,7 +131,7 @@ def read_csv(text: str, name: str, note: Note, alt_m: float | None) -> list[Miss
         frame = Frame.GLOBAL_TERRAIN_ALT if is_above_ground else Frame.GLOBAL_RELATIVE_ALT
         points.append(_Point(where, cells[lat], cells[lon], height, frame))
     if others:
-        note(f"only latitude, longitude and altitude are read: {others} other columns are left out")
+        note(f"only latitude, longitude and altitude are read: {others} other columns are ignored")
     return _items(points, name, note, alt_m)
 
 

@@ -38,9 +38,9 @@ def read_qgc_plan(text: str, name: str, note: Note = no_note) -> list[MissionIte
     _refuse_unknown_version(mission.get("version", _MISSION_VERSIONS[0]), _MISSION_VERSIONS, "its mission", name)
     other = _other_parts(plan)
     if other and not entries:
-        raise MissionFileError(name, "", *Fault.OTHER_PLAN(kinds=f"{other} and no mission"))
+        raise MissionFileError(name, "", *Fault.OTHER_PLAN(kinds=f"{other} but not a mission"))
     if other:
-        note(f"the plan also holds {other}: ignored")
+        note(f"the plan also contains {other}: ignored")
     if plan.get("fileType") is None:
         note("read as Mission Planner's own JSON: it has no fileType")
     items = [_home(mission.get("plannedHomePosition"), name)]
@@ -121,7 +121,7 @@ def _home(position: Any, name: str) -> MissionItem:
     where = "plannedHomePosition"
     coordinates = position if position is not None else []
     if not isinstance(coordinates, list) or len(coordinates) not in (0, 2, 3):
-        raise _not_a_plan(name, where, f"{shown(position)} where [latitude, longitude, altitude] must be")
+        raise _not_a_plan(name, where, f"{shown(position)} instead of [latitude, longitude, altitude]")
     numbers = [_number(value, name, where) for value in coordinates]
     lat, lon, alt_m = (*numbers, *[math.nan] * 3)[:3]
     return MissionItem(
@@ -159,7 +159,7 @@ def _item(entry: dict[str, Any], seq: int, name: str, where: str) -> MissionItem
         # Mission Planner's .mission stores the place separately.
         params = params[:4] + coordinate
     if not isinstance(params, list) or len(params) != _PARAM_COUNT:
-        raise _not_a_plan(name, where, f"it has no list of {_PARAM_COUNT} params")
+        raise _not_a_plan(name, where, f"it lacks a list of {_PARAM_COUNT} params")
     command = _integer(entry, "command", 65535, name, where)
     frame = _integer(entry, "frame", 255, name, where)
     p1, p2, p3, p4, lat, lon, alt_m = (_number(param, name, where) for param in params)

@@ -104,7 +104,7 @@ def apply_mask(body: bytes, mask: int) -> bytes:
 
 
 def clean_masked_request(command: int, body: bytes) -> bytes | None:
-    """Encode a request with a masked body; None if its frame would hold a hazard byte with every mask."""
+    """Encode a request with a masked body, or None if its frame would hold a hazard byte with every mask."""
     size = len(body) + 1
     mask = find_mask(body, size ^ command)
     if mask is None:

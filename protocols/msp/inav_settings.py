@@ -35,7 +35,7 @@ _VALUES = [struct.Struct(f"<{letter}") for letter in "BbHhIf"]
 
 
 class InavSetting(NamedTuple):
-    """A reply to COMMON_SETTING_INFO. name: empty if no setting can have it.
+    """A reply to COMMON_SETTING_INFO. name: empty if settings cannot have it.
 
     section: 0 is for all profiles. place: in INAV's table. choices: names of the values from minimum on.
     """

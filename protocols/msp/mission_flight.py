@@ -100,7 +100,7 @@ class FlightProgress:
     bearing: float = 0.0
     height_error: float = 0.0
     state_s: float = 0.0
-    #: How far the compass points too far clockwise, degrees; None if not measured yet, or not told.
+    #: How far the compass points too far clockwise, degrees, or None if not measured yet, or not told.
     compass: float | None = None
 
     @property

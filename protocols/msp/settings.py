@@ -25,7 +25,7 @@ class Part(Enum):
     MISC = "MISC"
 
 
-#: (name, bytes) from the first byte on; "": it has no name, or the board itself counts it.
+#: (name, bytes) from the first byte on; "": it lacks a name, or the board itself counts it.
 Layout = Sequence[tuple[str, int]]
 
 

@@ -54,7 +54,7 @@ Rights = Mapping[int, MspRight]
 
 
 def msp_right(firmware: Firmware, command: int, payload: bytes) -> MspRight:
-    """The right of a request, or UNKNOWN for what no handler is known to take."""
+    """The right of a request, or UNKNOWN without a known handler."""
     right = MSP_RIGHTS[firmware].get(command)
     if right is None:
         names = (rights[command].name for rights in MSP_RIGHTS.values() if command in rights)
@@ -108,7 +108,7 @@ _OLD_CHANGES = _changes(
 )  # fmt: skip
 _OLD_MOVES = _moves(SET_RAW_RC=200, SET_RAW_GPS=201)
 
-#: WP with another number is answered with a header and no payload. BOX has two bytes a box, or four with 5 or 6 aux
+#: WP with another number is answered with a header without a payload. BOX has two bytes a box, or four with 5 or 6 aux
 #: channels. 209 (SET_WP) is not handled, and MISSION_INFO only one in the extension, which is recognised by it.
 _HARAKIRI: Rights = {
     **_OLD_READS, **_OLD_MOVES, **_OLD_CHANGES,

@@ -51,7 +51,7 @@ _MOST_CONTROL = 1 << 20
 _FIND = "for boot in /boot/firmware /boot; do [ ! -e $boot/naze-bridge/{0} ] || exec sh $boot/naze-bridge/{0}; done"
 #: Once the folder is renamed, all is done. A power cut may have left a part of it.
 _CLEAN_UP = f"rm -rf /boot/firmware/{FOLDER}.done /boot/{FOLDER}.done; rm -f {_UNIT} {_LINK}"
-#: In firstrun.sh, where no network runs. The Imager's cmdline.txt restarts the Pi after it.
+#: In firstrun.sh, where the network does not run. The Imager's cmdline.txt restarts the Pi after it.
 _IN_FIRSTRUN = f"({_FIND.format('enable.sh')})"
 #: In user-data, once the system is up.
 _IN_USER_DATA = "[sh, /boot/firmware/naze-bridge/enable.sh, start]"
@@ -136,7 +136,7 @@ if [ -d /run/systemd/system ]; then systemctl reboot --no-block; fi
 
 
 class CardError(Exception):
-    """A card that cannot be prepared; one sentence."""
+    """A card that cannot be prepared, in one sentence."""
 
 
 @click.command()
@@ -240,7 +240,7 @@ def _check_signed(package: Path) -> str:
     if not is_signed(package):
         return "not signed"
     if not (keys.exists() and has_key(read_bounded(keys, _MAX_BYTES).decode())):
-        return "signed; this naze-bridge knows no key to check that"
+        return "signed, but this naze-bridge has no key to check it"
     with TemporaryDirectory() as folder:
         copied = Path(folder, "package")
         shutil.copyfile(package, copied)
@@ -311,7 +311,7 @@ class PackageFile(NamedTuple):
 
 
 def read_package(path: Path) -> PackageFile:
-    """Read a package's description; ValueError, one sentence, if it is damaged or no package."""
+    """Read a package's description; ValueError, one sentence, if it is damaged or not a package."""
     try:
         lines = map(plain_text, _control(path).splitlines())
         fields = dict(line.split(": ", 1) for line in lines if ": " in line)

@@ -130,7 +130,7 @@ def _free_port(wanted: int) -> int:
 
 
 class ClientError(Exception):
-    """The vehicle did not carry out a request; one sentence."""
+    """The vehicle did not carry out a request, in one sentence."""
 
 
 class MissionClient:

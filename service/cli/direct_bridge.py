@@ -24,7 +24,7 @@ _TELEMETRY_TIMEOUT_S = 3.0
 #: A board that is found by its MAVLink telemetry counts as armed until the heartbeat says otherwise.
 _HEARTBEAT_TIMEOUT_S = 1.5
 _INTERVAL_S = 0.05
-_UNCONFIRMED = "interrupted; the flight controller has not confirmed that it keeps its mission: see `naze-bridge pull`"
+_UNCONFIRMED = "interrupted; the flight controller has not confirmed that it kept its mission: see `naze-bridge pull`"
 _SHOWN = ("armed", "battery_v", "satellites", "mission_records")
 _FORBID_FLASHING = ("armed", "battery_v")
 
@@ -37,7 +37,7 @@ async def ask_directly(
     state_dir: Path | None = None,
     even_silent: bool = False,
 ) -> Json:
-    """Send a request to our own bridge on this port; ControlError or StoreError if there is no reply.
+    """Send a request to our own bridge on this port. ControlError or StoreError if there is no reply.
 
     `state_dir`: for backups of firmware. `even_silent`: a port without a flight controller is not an error. The status
     has the number of bytes received.

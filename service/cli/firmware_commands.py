@@ -39,7 +39,7 @@ def firmware() -> None:
 
 @firmware.command()
 @click.argument("image", type=PATH)
-@click.option("--battery", is_flag=True, help="Flash even if the board measures a battery.")
+@click.option("--battery", is_flag=True, help="Flash even if a battery is connected.")
 @bridge_options
 def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     """Flash IMAGE (.hex or .bin): a Harakiri with the mission patch, for a Naze32.
@@ -62,7 +62,7 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
 
 @firmware.command()
 @click.argument("backup", type=PATH)
-@click.option("--battery", is_flag=True, help="Write even if the board measures a battery.")
+@click.option("--battery", is_flag=True, help="Write even if a battery is connected.")
 @bridge_options
 def restore(client: BridgeClient, backup: Path, battery: bool) -> None:
     """Write BACKUP, the whole flash as `flash` stored it: firmware, settings and missions."""

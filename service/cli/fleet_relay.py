@@ -115,7 +115,7 @@ class FleetRelay:
         self._flush()
 
     def is_connected(self, _peer: Peer) -> bool:
-        """A socket for each station would be of no use on a machine with more memory and speed than a Pi."""
+        """A socket for each station would not help on a machine with more memory and speed than a Pi."""
         return False
 
     def gcs_gone(self, peer: Peer) -> None:

@@ -29,14 +29,14 @@ _UNUSABLE = 2
 @click.command()
 @click.argument("file", type=PATH)
 @click.option("--image", type=click.Path(exists=True, dir_okay=False, path_type=Path), help="The firmware to fly.")
-@click.option("--log", type=PATH, help="Judge the mission's real flight in this telemetry log instead.")
+@click.option("--log", type=PATH, help="Judge the real flight in this telemetry log instead.")
 @click.option("--flash", type=PATH, help="The flash of your own board (sim --flash). Default: a prepared board.")
 @click.option("--wind", type=click.FloatRange(0, 20), default=0.0, help="Wind with gusts, m/s.")
 @click.option("--wind-from", type=click.FloatRange(0, 360), default=270.0, show_default=True, help="Its direction.")
-@click.option("--seed", type=int, default=0, help="Seed of gusts and noise.")
+@click.option("--seed", type=int, default=0, help="Seed for gusts and noise.")
 @click.option("--mass", type=click.FloatRange(0.3, 4), default=1.0, show_default=True, help="The craft's weight, kg.")
 @click.option("--lie", "lies", metavar="NAME=VALUE", multiple=True, help=f"A fault, repeatable: {', '.join(NAMES)}.")
-@click.option("--svg", type=PATH, help="Draw the track into this file.")
+@click.option("--svg", type=PATH, help="Draw the track to this file.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def fly(
     file: Path,
@@ -51,9 +51,9 @@ def fly(
     svg: Path | None,
     as_json: bool,
 ) -> None:
-    """Fly a mission file in a simulated sky, with your own firmware, or judge a real flight of it.
+    """Fly a mission file in a simulation, with your own firmware, or assess a real flight of it.
 
-    Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). Nothing is sent to a real craft.
+    Needs a TestCode3 with mission flight (docs/howto/try-a-mission.md). The mission is not sent to a real craft.
 
     Exit code 1: the mission was not flown as in the file, or the craft crashed or went out of bounds.
     """
@@ -100,5 +100,5 @@ def _records(file: Path) -> tuple[WpRecord, ...]:
         fail(error, _UNUSABLE)
     if verdict.result is not Result.ACCEPTED:
         why = verdict.findings[-1].text() if verdict.findings else "empty"
-        fail(f"{shown_path(file)} is no mission to fly: {why}", _UNUSABLE)
+        fail(f"{shown_path(file)} is not a mission to fly: {why}", _UNUSABLE)
     return verdict.records

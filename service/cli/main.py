@@ -22,7 +22,7 @@ _COMMANDS = {
     "doctor": LazyCommand("service.cli.doctor.command:doctor", "Diagnose setup problems."),
     "check": LazyCommand("service.cli.check:check", "Show how mission files would be stored, offline."),
     "convert": LazyCommand("service.cli.convert:convert", "Write a mission file in another format."),
-    "fly": LazyCommand("service.cli.fly:fly", "Fly a mission file in a simulated sky, with your own firmware."),
+    "fly": LazyCommand("service.cli.fly:fly", "Fly a mission file in a simulation, with your own firmware."),
     "push": LazyCommand("service.cli.mission_commands:push", "Write a mission file and verify it."),
     "pull": LazyCommand("service.cli.mission_commands:pull", "Read the mission from the flight controller."),
     "clear": LazyCommand("service.cli.mission_commands:clear", "Clear the mission on the flight controller."),
@@ -69,7 +69,7 @@ class _Main(LazyGroup):
             # deb/tree.py divides the program into two packages.
             if not (error.name or "").startswith("simulator."):
                 raise
-            complain("this command is in the package naze-bridge-sim, from where naze-bridge is: install both together")
+            complain("this command is in the package naze-bridge-sim, released with naze-bridge: install both together")
             sys.exit(1)
         except OSError as error:
             if error.errno not in _UNWRITABLE:
@@ -102,7 +102,7 @@ def _show_version(context: click.Context, _option: click.Parameter, is_given: bo
     from service.machine.package import address, version  # reads files: not at every start
 
     click.echo(f"naze-bridge, version {version()}")
-    issues = address("Issues") or "ask where you got this copy from, because it names no address"
+    issues = address("Issues") or "ask where you got this copy from, because it does not name an address"
     click.echo(f"Problems, questions, recordings: {issues}")
     context.exit()
 
@@ -120,5 +120,5 @@ def main() -> None:
     """Companion bridge between a MultiWii-family flight controller and MAVLink ground stations.
 
     Exit codes: 0 done, 1 refused or failed, 2 wrong usage or an unreadable file, 74 the output cannot be written, 130
-    interrupted. The help of a command names its own.
+    interrupted. Commands list further codes in their own help.
     """

@@ -33,14 +33,14 @@ _WITH_DUMPS = ("INAV", "Harakiri")
 def settings() -> None:
     """Read, change, save, back up and restore the flight controller's settings.
 
-    A change acts at once, and is lost at power-off unless it is saved. Nothing is written while the craft is armed.
+    A change acts at once, and is lost at power-off unless it is saved. It is refused while the craft is armed.
     """
 
 
 @settings.command("list")
 @bridge_options
 def list_settings(client: BridgeClient) -> None:
-    """List all settings with their values and ranges. Long ones have a shorter name as MAVLink parameters."""
+    """List all settings with their values and ranges. Long names are shortened for MAVLink parameters."""
     held = _held(client)
     client.show(held, lambda: _print_settings(held))
 
@@ -124,7 +124,7 @@ def backup(client: BridgeClient, file: Path) -> None:
     elif held["board"].startswith(_WITH_DUMPS):
         text = write_dump({each["name"]: each["shown"] for each in held["settings"]}, held["board"], [comment])
     else:
-        fail(f"the command line of {held['board']} has other names for these settings: name the file .param")
+        fail(f"the command line of {held['board']} has other names for these settings: use a file that ends in .param")
     if file == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return
@@ -177,7 +177,7 @@ def restore(client: BridgeClient, source: str, dry_run: bool) -> None:
 def diff(client: BridgeClient, first: str, second: str) -> None:
     """Compare the settings of FIRST and SECOND. Exit code 1 if they differ.
 
-    Each is a .param file, a dump, a backup's number, or `board` for the flight controller's present settings (the
+    Each is a .param file, a dump, a backup number, or `board` for the flight controller's present settings (the
     default of SECOND).
     """
     from bridge.settings.local_settings import by_setting  # other commands do without the bridge
@@ -208,7 +208,7 @@ def diff(client: BridgeClient, first: str, second: str) -> None:
 @click.option("--limit", type=click.IntRange(1, MOST), default=20, show_default=True, help="The maximum number.")
 @daemon_options
 def history(client: BridgeClient, limit: int) -> None:
-    """List the backups, newest first. One is taken when a board is first met, and at every change."""
+    """List the backups, newest first. A backup is made when a board is first seen, and at every change."""
     found = client.ask({"do": "backups", "limit": limit})["backups"]
     if client.as_json:
         print_json(found)
@@ -269,7 +269,7 @@ def _source(client: BridgeClient, name: str, held: Json | None = None) -> tuple[
         return _values(held), held["board"]
     if not _is_file(name):
         if int(name) > MOST:
-            raise click.UsageError(f"{name} is not a backup's number: see `naze-bridge settings history`")
+            raise click.UsageError(f"{name} is not a backup number: see `naze-bridge settings history`")
         stored = replace(client, fc=None).ask({"do": "backup", "number": int(name)})
         return setting_values(stored["values"]), stored["kind"]
     try:
@@ -290,7 +290,7 @@ def _held(client: BridgeClient) -> Json:
     """All settings, with a complaint if they may not be up to date."""
     held = client.ask({"do": "settings"})
     if not held["is_checked"]:
-        complain("the flight controller cannot be asked now: these are its settings as last read")
+        complain("the flight controller cannot be read now: these are its settings as last read")
     if not held["is_complete"]:
         complain("some settings could not be read")
     return held
@@ -308,7 +308,7 @@ def _show_plan(plan: Json) -> None:
     if plan["notice"]:
         say(plan["notice"], to_error=True)
     if not plan["changes"] and not plan["left_out"]:
-        click.echo("Nothing to restore: the flight controller has these settings.")
+        click.echo("Nothing to restore: the flight controller already has these settings.")
 
 
 def _show_left_out(settings: list[Json]) -> None:

@@ -12,13 +12,13 @@ from terminal.sentences import say
 def signing() -> None:
     """Accept ground stations again after a wrong clock.
 
-    A signature has a time: one that is over a minute behind the bridge's, or over a day ahead, is refused.
+    Signatures carry a time, and are refused if it is over a minute behind the bridge's clock, or over a day ahead.
     """
 
 
 @signing.command()
 @daemon_options
 def reset(client: BridgeClient) -> None:
-    """Forget the times of all ground stations, and believe the next one with the key."""
+    """Forget the times of all ground stations, and accept that of the next station with the key."""
     done = client.ask({"do": "reset-signing"})
     client.show(done, lambda: say(done["text"]))

@@ -66,7 +66,7 @@ def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tupl
     for text in facts["recording"]:
         yield "Recording", text
     for text in facts.get("ports_passed_over", ()):
-        yield "Port passed over", text
+        yield "Port skipped", text
     for text in facts["refused"]:
         yield "Refused", text
 

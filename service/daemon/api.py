@@ -46,7 +46,7 @@ class DaemonApi:
                 may_erase = request.get("may_erase") is not False
                 items = request.get("items")
                 if isinstance(items, list) and len(items) > MAX_ITEMS:
-                    raise ControlError(f"no flight controller stores such a long mission: {len(items)} items")
+                    raise ControlError(f"this mission is longer than any flight controller stores: {len(items)} items")
                 return await self.push(mission_items(items), source, progress, may_erase=may_erase)
             case "pull":
                 return await self.pull()

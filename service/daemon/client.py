@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Requests to a running daemon through the control socket (service.daemon.control_server).
 
-Imports no part of the daemon, so that a command starts quickly.
+Does not import the daemon, so that a command starts quickly.
 """
 
 import json
@@ -28,7 +28,7 @@ _SERVICE_FOLDER = "/run/naze-bridge"
 
 
 class ControlError(Exception):
-    """The daemon refused or is not running; one sentence."""
+    """The daemon refused or is not running, in one sentence."""
 
 
 class Interrupted(Exception):
@@ -36,7 +36,7 @@ class Interrupted(Exception):
 
 
 def ask_daemon(state_dir: Path | None, request: Json, progress: Callable[[Any], None] = lambda _: None) -> Json:
-    """Ask the daemon that runs on `state_dir` (None: see find_socket); ControlError if there is none or it refuses."""
+    """Ask the daemon that runs on `state_dir` (None: see find_socket). ControlError if there is none or it refuses."""
     path = find_socket(state_dir)
     line = to_json(request).encode() + b"\n"  # before connecting: the daemon waits only 5 s for the request
     with (
@@ -87,7 +87,7 @@ def socket_of_daemon(state_dir: Path) -> Path:
 def find_socket(state_dir: Path | None) -> Path:
     """The socket of a running daemon: on `state_dir`, else the user's own, else the service's.
 
-    SettingsError if the user has no home and there is no service.
+    SettingsError if the user lacks a home and there is no service.
     """
     if state_dir is not None:
         own, stand_in = state_dir / SOCKET_NAME, _stand_in(state_dir) / SOCKET_NAME

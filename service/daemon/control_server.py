@@ -145,7 +145,7 @@ async def _read_line(reader: asyncio.StreamReader) -> bytes:
         return await reader.readline()
     except ValueError:
         limit = f"a request is limited to {_MAX_LINE >> 10} kB"
-        raise ControlError(f"{limit}: no flight controller stores such a long mission") from None
+        raise ControlError(f"{limit}: this mission is longer than any flight controller stores") from None
 
 
 def _request(line: bytes) -> Json:

@@ -208,7 +208,7 @@ class Daemon:
 
     @property
     def clock_trouble(self) -> str:
-        """How far this machine's clock is off; empty if it is right, set by a network, or not known to be wrong."""
+        """How far this machine's clock is off, or empty if it is right, set by a network, or not known to be wrong."""
         vehicle, own_epoch_s = self.bridge.vehicle, time.time() - self._loop.time()
         gps = vehicle.last(GpsTime)
         epoch_s = vehicle.station_epoch_s if gps is None else gps.unix_s - gps.heard_at

@@ -292,7 +292,7 @@ class FcConnection:
 
     @property
     def where(self) -> str:
-        """The port or address. While no port is open, the kinds of port searched."""
+        """The port or address. Before a port is open, the kinds of port searched."""
         return self._name if self._finder is None else self._finder.where
 
     @property

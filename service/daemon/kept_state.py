@@ -95,7 +95,7 @@ class LastSettings:
 
     def __init__(self, folder: Path | None, port: Callable[[], str]) -> None:
         self._port = port
-        self._file = StateFile(folder, SETTINGS_FILE, "earlier changes of settings go unseen")
+        self._file = StateFile(folder, SETTINGS_FILE, "earlier changes of settings may be missed")
         self._boards: dict[str, Mapping[str, Value]] = self._file.load(_settings) or {}
         self.close = self._file.close
 

@@ -31,7 +31,7 @@ Progress = Callable[[Json], None]
 
 
 class SettingsApi:
-    """The requests, as coroutines with plain data; ControlError or StoreError if one fails."""
+    """The requests, as coroutines with plain data. ControlError or StoreError if one fails."""
 
     def __init__(self, daemon: Daemon) -> None:
         self._daemon = daemon

@@ -106,7 +106,7 @@ class StoreWorker:
         except StoreError as error:
             _log.error("store.failed", why=str(error))
         if self._path is not None and not os.path.exists(self._path):
-            _log.error("store.failed", why=f"{self._path} was removed while the bridge ran: its missions are lost")
+            _log.error("store.failed", why=f"{self._path} was removed while in use: its missions are lost")
 
     def _do(self, effect: StoreEffect) -> object:
         nothing: object = RecalledMission() if isinstance(effect, Recall) else None

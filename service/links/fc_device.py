@@ -65,7 +65,7 @@ def device_opener(address: FcAddress) -> Callable[[], Awaitable[Device]]:
 
 
 def open_serial(path: str) -> serial.Serial:
-    """Open a serial port for exclusive use; PortError if that fails. It searches all processes for a login console."""
+    """Open a serial port for exclusive use. PortError if that fails. It searches all processes for a login console."""
     console = find_console(path)
     if console is not None:
         raise PortInUseError(
@@ -112,7 +112,7 @@ async def _open_tcp(address: TcpFc, resolver: BackgroundThread) -> socket.socket
     with ExitStack() as unless_connected:
         connection = unless_connected.enter_context(socket.socket(family, socket.SOCK_STREAM))
         connection.setblocking(False)
-        with _explained(address, "is it switched on, and the port right?"):
+        with _explained(address, "is it switched on, and is the port right?"):
             async with asyncio.timeout(_TIMEOUT_S):
                 found = await _look_up(address, resolver)
                 await asyncio.get_running_loop().sock_connect(connection, found)

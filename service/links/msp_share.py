@@ -20,7 +20,7 @@ _MAX_PROGRAMS = 8
 
 
 async def open_share(share: ShareSettings, bridge: Bridge, flush: Callable[[], None]) -> Callable[[], None]:
-    """Listen; LinkError if that fails. Returns a function that closes the port and its connections.
+    """Listen. LinkError if that fails. Returns a function that closes the port and its connections.
 
     `flush` carries out the bridge's outputs.
     """

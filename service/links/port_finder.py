@@ -96,7 +96,7 @@ class PortFinder:
                 return port.path
         if len(ports) != 1:
             which = f"one of {', '.join(port.path for port in ports)}" if ports else "none was found"
-            raise PortError(f"it is not known which port the flight controller is on ({which}): name it (fc)")
+            raise PortError(f"it is not known which port the flight controller is on ({which}): set it (fc)")
         return ports[0].path
 
     def close(self) -> None:

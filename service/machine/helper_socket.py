@@ -24,7 +24,7 @@ MAX_PACKAGE = 128 << 20
 
 
 class HelperError(Exception):
-    """The helper refused, failed, or is not there; one sentence."""
+    """The helper refused, failed, or is not there, in one sentence."""
 
 
 def unit_of(action: object) -> str | None:
@@ -33,7 +33,7 @@ def unit_of(action: object) -> str | None:
 
 
 async def ask_helper(request: Json, body: Iterable[bytes] = ()) -> Json:
-    """Send a request, followed by its body; returns the reply. HelperError if the helper did not carry it out."""
+    """Send a request, followed by its body. Returns the reply. HelperError if the helper did not carry it out."""
     runtime = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     if not runtime:
         raise HelperError("This works only for the service: sudo systemctl start naze-bridge")

@@ -23,7 +23,7 @@ LOGIN_PROGRAMS = ("agetty", "getty", "login")
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """A running program. `arguments` includes its name."""
+    """A running program. `arguments` includes the name."""
 
     pid: int
     arguments: tuple[str, ...]

@@ -42,7 +42,7 @@ def pi_model(host: Host) -> PiModel | None:
 def is_mini_uart(host: Host, device: str) -> bool:
     """True for the UART that models before the Pi 5 have on the header while Bluetooth has the better one.
 
-    It has no FIFO to speak of, and the speed follows the core's clock.
+    It lacks a FIFO to speak of, and the speed follows the core's clock.
     """
     model = pi_model(host)
     return model is not None and model.header_uart == "/dev/serial0" and str(host.resolve(device)) == "/dev/ttyS0"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folder of telemetry logs: one file at a time, bounded in size and total.
 
-Reads no clock: the time is passed in, or taken from the records themselves.
+Does not read a clock: the time is passed in, or taken from the records themselves.
 """
 
 import os

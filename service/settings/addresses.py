@@ -175,7 +175,7 @@ def parse_table(entry: object, setting: str, example: str, keys: Sequence[str]) 
     for key in entry:
         if key not in known:
             raise AddressError(
-                f"{setting} {address}: {key!r} is not a setting of this table; known are {', '.join(known)}"
+                f"{setting} {address}: {key!r} is not a setting of this table; there are {', '.join(known)}"
             )
     return address, entry
 

@@ -28,7 +28,7 @@ Keys = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A value with its source, and the folder for relative file names in it."""
+    """A value with the source, and the folder for relative file names in it."""
 
     value: object
     where: str
@@ -52,7 +52,7 @@ def read_files(config: Path, problems: list[Problem], page: str | None = None) -
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint for an unknown name: the nearest known one, or all."""
     near = difflib.get_close_matches(name, list(known), n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
+    return f"did you mean {near[0]!r}?" if near else f"there are {', '.join(sorted(known))}"
 
 
 def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> dict[str, Given]:
@@ -72,7 +72,7 @@ def _read_file(path: Path, problems: list[Problem], text: str | None = None) -> 
     lines = key_lines(text)
     found: dict[str, Given] = {}
     for keys, value in _flat(tables):
-        # A quoted dot belongs to the name, and no setting has one.
+        # A quoted dot belongs to the name, which settings do not have.
         name = ".".join(f'"{key}"' if "." in key else key for key in keys)
         line = lines.get(keys, lines.get(keys[:1]))
         where = str(path) if line is None else f"{path}:{line}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One setting: its name, its meaning, how the value is read, and the problems of a wrong value."""
+"""One setting: the name, the meaning, how the value is read, and the problems of a wrong value."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -39,7 +39,7 @@ def default_state_dir() -> Path:
 def load_settings(
     config: Path | None, gcs: Sequence[str] = (), page: str | None = None, /, **flags: object
 ) -> Settings:
-    """Load the settings for `run`; SettingsError lists all problems. `flags`: settings by name, None if not given.
+    """Load the settings for `run`. SettingsError lists all problems. `flags`: settings by name, None if not given.
 
     `page`: a draft of the status page's file, which is not read then.
     """

@@ -11,7 +11,7 @@ import string
 
 #: Too many bits to guess.
 LEAST_BITS = 80
-#: No character that looks like another, and no capitals to type on a phone.
+#: Without characters that look alike, and without capitals to type on a phone.
 _ALPHABET = "abcdefghjkmnpqrstvwxyz23456789"
 _GROUPS, _GROUP_SIZE = 4, 5
 #: Characters that a guesser has to try for each class in use; others count as 100.

@@ -107,5 +107,5 @@ class Settings(BridgeSettings):
 
     @property
     def tlog(self) -> int | None:
-        """The size of all telemetry logs, bytes; None if telemetry is not recorded."""
+        """The size of all telemetry logs, bytes, or None if telemetry is not recorded."""
         return self.tlog_total_mb << 20 if self.record_tlog else None

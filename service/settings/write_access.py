@@ -62,7 +62,7 @@ def parse_link(entry: object, folder: Path) -> tuple[GcsAddress, WriteAccess]:
     address, table = parse_table(entry, "gcs", "udpin:0.0.0.0:14550", ["key_file", "writers"])
     key_file, writers = table.get("key_file"), table.get("writers")
     if writers is not None and address.is_serial:
-        raise AddressError(f"gcs {address}: writers are networks, which a radio has none of: use key_file")
+        raise AddressError(f"gcs {address}: writers lists networks, and a radio does not have any: use key_file")
     if key_file is not None and (not isinstance(key_file, str) or not key_file):
         raise AddressError(f"gcs {address}: key_file must be the name of a file that holds the passphrase")
     if writers is not None and not isinstance(writers, list):

@@ -96,8 +96,8 @@ class _State(Collector):
         stations = len(self._daemon.report().link.ground_stations)
         yield _gauge("ground_stations", "Ground stations currently heard.", {}, stations)
         damaged = counters.bad_frames
-        yield _counted("ground_damaged_frames", "Frames of ground stations with a wrong checksum.", damaged)
-        refused = _counters("refused_frames", "Frames of ground stations without write access.", "link", "why")
+        yield _counted("ground_damaged_frames", "Frames from ground stations with a wrong checksum.", damaged)
+        refused = _counters("refused_frames", "Frames from ground stations without write access.", "link", "why")
         for (link, why), count in counters.refused.items():
             refused.add_metric([link, why], count)
         yield refused
@@ -114,7 +114,7 @@ class _State(Collector):
         )
         # These restart at 0 with each flight controller found, which Prometheus permits for counters.
         damaged = link.bad_checksums or 0
-        yield _counted("fc_damaged_frames", "Frames of the flight controller with a wrong checksum.", damaged)
+        yield _counted("fc_damaged_frames", "Frames from the flight controller with a wrong checksum.", damaged)
         if link.requests_lost is not None and link.round_trip_ms is not None:
             lost = link.requests_lost
             yield _counted("fc_lost_requests", "MSP requests that were not answered in time.", lost)

@@ -31,7 +31,7 @@ from service.web.sent_files import MissionWriter
 _MAX_REQUEST = 64 << 10
 _PIECE = 1 << 16
 _ELSEWHERE = "The Pi can be changed only from its own network: its hotspot, or the network that it has joined."
-_NOT_NEXT = "This piece does not follow the one before, or the package is too long: begin again."
+_NOT_NEXT = "This part does not follow the previous part, or the package is too long: begin again."
 _log = structlog.get_logger()
 
 
@@ -118,7 +118,7 @@ class PiControl:
         return json_reply({"count": count, "lines": [line._asdict() for line in lines]})
 
     def _append(self, start: int, piece: bytes) -> int:
-        """Append a piece that follows those before; FileNotFoundError if it does not. Returns the size so far."""
+        """Append a piece that follows those before. FileNotFoundError if it does not. Returns the size so far."""
         if start == 0:
             self._drop_package()
             # Without a name: the kernel removes it with the daemon.

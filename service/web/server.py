@@ -115,7 +115,7 @@ def _token(daemon: Daemon, settings: WebSettings) -> Token | TokenError:
 
 
 def _static_files() -> Iterator[tuple[str, Handler]]:
-    """Yield path and handler of each of the page's files. They are in memory, so no request waits for the card."""
+    """Yield path and handler of each of the page's files. They are in memory, so requests do not wait for the card."""
     for file in sorted(_FOLDER.iterdir()):
         if file.suffix in _TYPES:
             yield "/" if file.name == "index.html" else f"/{file.name}", _handler(file)

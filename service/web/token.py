@@ -18,7 +18,7 @@ _MAX_FILE = 4096
 
 
 class TokenError(Exception):
-    """No token is available; one sentence."""
+    """No token is available, in one sentence."""
 
 
 class Token:

@@ -27,7 +27,7 @@ _log = structlog.get_logger()
 
 
 class QueryRefused(Exception):
-    """The query gets an error; one sentence. `result`: further data for the client."""
+    """The query gets an error, in one sentence. `result`: further data for the client."""
 
     def __init__(self, text: str, result: Json | None = None) -> None:
         super().__init__(text)

@@ -139,7 +139,7 @@ class SessionThread:
 
 
 async def log_outages(diagnose: Callable[[], str], is_alone: Callable[[], bool]) -> None:
-    """Log why no session is connected, because zenoh keeps trying without a message; never returns.
+    """Log why sessions are not connected, because zenoh keeps trying without a message; never returns.
 
     Each new reason is logged once, if two diagnoses in a row find it and the bridge is still alone: a single one may
     meet a router that has just returned, before zenoh has joined it. `diagnose` may block: it is called on a thread,

@@ -126,8 +126,8 @@ def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: 
 _OBEYING_MODES = ("setpriv", "--bounding-set=-dac_override", "--inh-caps=-dac_override") if os.geteuid() == 0 else ()
 _SAVED_NOTHING = {
     "read-only": ("signing.json", "Permission denied"),
-    "removed": ("signing.json", "No such file or directory", "missions.db was removed while the bridge ran"),
-    "a file": ("signing.json", "Not a directory", "missions.db was removed while the bridge ran"),
+    "removed": ("signing.json", "No such file or directory", "missions.db was removed while in use"),
+    "a file": ("signing.json", "Not a directory", "missions.db was removed while in use"),
 }
 
 

@@ -41,7 +41,7 @@ def test_an_unusable_zenoh_file_is_reported_in_one_sentence(tmp_path: Path) -> N
         broken.write_text(text)
         assert f"{broken} is not a zenoh configuration" in sentence_of("list", "--zenoh-config", broken)
     broken.write_text('{mode: "client"}')
-    assert "names no connect/endpoints" in sentence_of("list", "--zenoh-config", broken)
+    assert "lacks connect/endpoints" in sentence_of("list", "--zenoh-config", broken)
 
 
 def test_vehicles_must_be_named() -> None:

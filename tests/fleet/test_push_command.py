@@ -39,7 +39,7 @@ def test_a_file_without_storable_items_keeps_the_mission(fleet: Fleet, tmp_path:
     fleet.pushed(plan_file(tmp_path, plain_plan(4)), "--vehicle", "kite", code=0)
     nothing = plan_file(tmp_path, [HOME, PlanRow(178, p2=5.0)])
     tried = fleet.ask("push", nothing, "--vehicle", "kite", "--dry-run")
-    assert (tried.returncode, "no item of it can be stored" in tried.stdout) == (1, True), tried
+    assert (tried.returncode, "none of its items can be stored" in tried.stdout) == (1, True), tried
     pushed = fleet.pushed(nothing, "--vehicle", "kite", code=1)
     assert "would erase the mission" in pushed["kite"]["error"]
     assert fleet.daemons["kite"].pull()["count"] == 4

@@ -61,7 +61,7 @@ def test_a_file_that_is_not_a_mission_is_not_sent(tmp_path: Path) -> None:
 
 def test_an_unusable_name_is_reported_in_one_sentence() -> None:
     reason = sentence_of("enroll", "my plane", code=2)
-    assert reason.startswith("naze-bridge: the name is 'my plane': make a name of at most 64 letters")
+    assert reason.startswith("naze-bridge: the name is 'my plane': use at most 64 letters")
 
 
 def test_an_unusable_folder_is_reported_in_one_sentence(tmp_path: Path) -> None:

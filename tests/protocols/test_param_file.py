@@ -74,7 +74,7 @@ def test_a_value_that_is_not_a_number_is_left_out() -> None:
         (b"A\x1b[31m,1\n", "line 1", "not a setting's name"),
         (b"51.1 0.1\n51.2 0.2\n", "line 1", "not a setting's name"),  # a fence
         (b"QGC WPL 110\n0\t1\n", "line 1", "mission"),
-        (b"# only comments\n", "", "no settings"),
+        (b"# only comments\n", "", "not contain settings"),
     ],
 )
 def test_an_error_names_the_line_and_the_problem(text: bytes, place: str, what: str) -> None:

@@ -41,7 +41,7 @@ def test_reads_set_lines_as_inavs_command_line_does(line: bytes) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (b"", "no settings"),
+        (b"", "not contain settings"),
         (b"safehome 0 1 45.3 8\n", "line 1: 'safehome 0 1 45.3 8' cannot be read; write safehome NUMBER"),
         (
             b"set a = 1\nset nav_rth_altitude 2000\n",
@@ -119,5 +119,5 @@ def test_a_written_dump_reads_back() -> None:
 
 
 def test_a_dump_without_a_setting_is_not_read_as_a_param_file() -> None:
-    with pytest.raises(FileError, match=r"this file holds no settings; give a \.param file or a dump"):
+    with pytest.raises(FileError, match=r"this file does not contain settings; give a \.param file or a dump"):
         read_settings_file(b"# INAV/X 7.1.2\nbatch start\nwp 0 0 0 0 0 0 0 0 0\nsave\n", "x")

@@ -215,7 +215,7 @@ def test_a_stop_is_seen_with_the_reason(image: Image, figure: Figure, tele_prot:
     flight.pilot.wait(4.0)
     watch = flight.watch
     since, _ = watch.first(lambda truth: truth.phase == FlightPhase.HELD)
-    why = "Mission stopped: roll or pitch stick"
+    why = "Mission stopped: roll or pitch stick moved"
     late = {
         "text": watch.first_sent("STATUSTEXT", since, lambda sent: sent.text == why) - since,
         "paused": watch.first_sent(

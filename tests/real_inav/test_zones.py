@@ -23,7 +23,7 @@ ROUND = leg(20), leg(20, east_m=350), leg(360, east_m=350), leg(360)
     [
         (circle(300, 50, FenceAction.POS_HOLD), WAY, [ANGLE], True, INTO),
         (circle(300, 50, FenceAction.POS_HOLD), WAY, [], False, INTO),
-        (circle(300, 50, FenceAction.NONE), WAY, [ANGLE], False, "geozone 0: flown, no action is set"),
+        (circle(300, 50, FenceAction.NONE), WAY, [ANGLE], False, "geozone 0: crossed, no action is set"),
         (circle(300, 50, FenceAction.POS_HOLD, highest_cm=600), WAY, [ANGLE], False, ""),
         (circle(300, 50, FenceAction.POS_HOLD, lowest_cm=4000, highest_cm=9000), WAY, [ANGLE], False, ""),
         (circle(0, 250, FenceAction.POS_HOLD, is_inclusive=True), WAY, [ANGLE], True, OUT),

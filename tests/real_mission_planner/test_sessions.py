@@ -138,7 +138,7 @@ def test_resume_mission_keeps_the_rest_and_names_the_way_back(session: Sessions)
     began = planner.now
     planner.do("answer", "10")
     planner.do("press", "FlightData", "BUT_resumemis_Click", end="item")
-    planner.wait_for("message", "The whole mission before: see Missions", began)
+    planner.wait_for("message", "The previous whole mission: see Missions", began)
     assert len(board.records()) < len(rows)
     # It asks for the mode every second, for 30 s: the reason stays on the HUD.
     planner.wait_for("line", "Modes are set with the transmitter switches", began)

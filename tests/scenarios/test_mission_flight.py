@@ -144,7 +144,7 @@ def test_a_stopped_flight_is_paused_and_the_mode_is_that_of_the_boxes(tele_prot:
     flight.faults.boxes = LEVEL | HOLD
     flight.reports(replace(LEG, state=FlightPhase.HELD, reason=FlightReason.STICKS))
     assert (flight.current, flight.mode) == ((1, PAUSED), LOITER)
-    assert flight.station.texts()[-1] == "Mission stopped: roll or pitch stick"
+    assert flight.station.texts()[-1] == "Mission stopped: roll or pitch stick moved"
 
 
 def texts_of(flight: Flight) -> list[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All settings of a Harakiri with the mission extension: its commands SETTING and SET_SETTING, and the modes of BOX."""
+"""All settings of a Harakiri with the mission extension: the commands SETTING and SET_SETTING, and the modes of BOX."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -52,7 +52,7 @@ _BUSY_TRIES, _BUSY_INTERVAL_S = 12, 0.1
 #: Writing and reading back take a quarter of a second.
 _SAVED_AFTER_S = 0.3
 _SAVES = 2
-_CRASHES = "a running Harakiri can crash with another one; set it on its command line"
+_CRASHES = "changing it can crash a running Harakiri: set it on the board's command line"
 _FIXED = dict.fromkeys(
     ("gbl_flg", *(f"align_{sensor}_{axis}" for sensor in ("gyro", "acc", "mag") for axis in "xyz")), _CRASHES
 )
@@ -84,7 +84,7 @@ _UNITS = {
     }.items()
     for name in names.split()
 }  # fmt: skip
-_LOWERED_ONLY = {"esc_moff": "it can only be lowered, a disarmed board sends it to the motors"}
+_LOWERED_ONLY = {"esc_moff": "it can only be lowered, because a disarmed board sends it to the motors"}
 
 
 class _Place(NamedTuple):

@@ -187,10 +187,10 @@ class FenceCheck(ListCheck):
 
     def _take_corner(self, item: MissionItem, corner: Corner) -> RejectingFinding | None:
         if not (isfinite(item.p1) and item.p1 >= _LEAST_CORNERS):
-            return reject(MissionResult.INVALID_PARAM1, item, "p1", "a polygon has three corners or more")
+            return reject(MissionResult.INVALID_PARAM1, item, "p1", "a polygon needs three corners or more")
         self._first = first = self._first or item
         if corner in self._corners:
-            return reject(MissionResult.INVALID, item, "lat_e7", "a corner is there already: remove one")
+            return reject(MissionResult.INVALID, item, "lat_e7", "duplicate corner: remove it")
         self._corners.append(corner)
         if len(self._corners) < item.p1:
             return None
@@ -211,12 +211,12 @@ class FenceCheck(ListCheck):
         kept = zone if known is None else known
         self._zones.append(replace(kept, number=number))
         if known is None:
-            why = f"geozone {number} is new: no action at its border, no limits of height (set them in INAV)"
+            why = f"geozone {number} is new: no action at the border, no altitude limits (set them in INAV)"
             self._note(item, "p1", item.p1, item.p1, why, News.NOTICE)
         elif hidden := hidden_values(known):
             self._note(item, "p1", item.p1, item.p1, f"geozone {number} keeps {hidden}", News.NOTICE)
         if number >= GEOZONES or sum(each.vertices for each in self._zones) > VERTICES:
-            why = f"more than the {GEOZONES} zones or {VERTICES} vertices that fit, of which a circle takes two"
+            why = f"only {GEOZONES} zones and {VERTICES} vertices fit (a circle takes two)"
             return reject(MissionResult.NO_SPACE, item, "command", why)
         return None
 
@@ -228,7 +228,7 @@ class FenceCheck(ListCheck):
         if self._first is not None:
             return self._cut_short(self._first)
         if not self._zones and self._taken:
-            return reject_list(MissionResult.INVALID, self._count, "no zone is left")
+            return reject_list(MissionResult.INVALID, self._count, "no usable zone")
         return None
 
     def _conclude(self) -> Verdict[Geozone]:
@@ -241,7 +241,7 @@ class FenceCheck(ListCheck):
         if not self._rules.is_feature_on:
             self._say("INAV's feature GEOZONE is off: the fence has no effect")
         elif zones != self._rules.current:
-            self._say("INAV uses its new geozones after its next start", News.NOTICE)
+            self._say("INAV uses the new geozones after a restart", News.NOTICE)
         return Verdict(Result.ACCEPTED, MissionResult.ACCEPTED, zones, fence_items(zones), tuple(self._findings))
 
 

@@ -41,11 +41,11 @@ class MissionPart(Enum):
     LANDING = "LAND, RTL that lands", "command"
 
 
-_NO_SPEED = "its speed: no effect on {}", News.WARNING
+_NO_SPEED = "speed ignored on {}", News.WARNING
 _NO_TURN = "no effect on {}", News.WARNING
 _ON_THE_GROUND = {
     MissionPart.SPEED: _NO_SPEED,
-    MissionPart.HEIGHT: ("Alt: no effect on {}", News.NOTICE),
+    MissionPart.HEIGHT: ("Alt ignored on {}", News.NOTICE),
     MissionPart.HOLD: ("{} drives on while it holds", News.WARNING),
     MissionPart.TURN: _NO_TURN,
     MissionPart.LANDING: ("{} disarms there", News.NOTICE),
@@ -177,7 +177,7 @@ class InavLimits:
         yield from beyond_plain_limits(path, departure, height=not self.nav_max_altitude)
         if self.selected > 1:
             has_approaches = self.platform is Platform.AEROPLANE and self.approach is not None
-            lands = ": each mission lands by the FW approach of its new number" * has_approaches
+            lands = ": each mission lands by the FW approach with the new number" * has_approaches
             why = f"Stored as mission 1, mission {self.selected} was selected{lands}"
             yield Judgement(None, "", why, News.WARNING if has_approaches else News.NOTICE)
 
@@ -190,10 +190,10 @@ class InavLimits:
             return
         if departure.home is not None and distance_m(departure.home, first) <= limit_m:
             off = in_metres(distance_m(departure.place, departure.home))
-            yield Judgement(0, "lat_e7", f"arms only near the list's home, {off} off")
+            yield Judgement(0, "lat_e7", f"arms only near the list's home, {off} away")
             return
         limit = f"nav_wp_max_safe_distance is {limit_m} m"
-        yield Judgement(0, "lat_e7", f"{in_metres(metres)} from {departure.name}, {limit}: it would not arm", None)
+        yield Judgement(0, "lat_e7", f"{in_metres(metres)} from {departure.name}, {limit}: INAV would not arm", None)
 
     def _heights(self, records: Sequence[NavRecord], departure: Departure) -> Iterable[Judgement]:
         limit_cm = self.nav_max_altitude
@@ -209,7 +209,7 @@ class InavLimits:
             elif height_cm > limit_cm and self.version < _LIMITS_MISSIONS:
                 higher.append((place, f"{height_cm / 100:g} m, over nav_max_altitude {limit_cm / 100:g} m"))
             elif height_cm > limit_cm:
-                why = f"nav_max_altitude is {limit_cm / 100:g} m, it would not climb to {height_cm / 100:g} m"
+                why = f"nav_max_altitude is {limit_cm / 100:g} m: INAV would not climb to {height_cm / 100:g} m"
                 yield Judgement(place, "alt_m", why, None)
         yield from first_of(unknown, "alt_m")
         yield from first_of(higher, "alt_m")

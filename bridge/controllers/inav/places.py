@@ -55,7 +55,7 @@ class InavPlaceStore(FcMissionStore[RecordT]):
     def __init__(self, controller: FlightController) -> None:
         assert controller.arm_bit is not None
         self._arm_bit = controller.arm_bit
-        #: As last read; None if unknown.
+        #: As last read, or None if unknown.
         self._known: tuple[RecordT, ...] | None = None
         #: True if the board's RAM may differ from the flash.
         self._is_unsaved = False
@@ -162,7 +162,7 @@ def read_safehomes() -> Conversation[tuple[Safehome, ...] | None]:
 
 
 def with_approaches(safehomes: Sequence[Safehome], approaches: Sequence[FwApproach]) -> tuple[Safehome, ...]:
-    """Each safehome's approach has its number. A version without approaches has none."""
+    """A safehome's approach has the same number. Older versions lack approaches."""
     return tuple(each._replace(approach=approaches[each.number]) if approaches else each for each in safehomes)
 
 
@@ -224,7 +224,7 @@ class RallyCheck(ListCheck):
             self._note(item, *missing, DROPPED, "no Lat/Long")
             return None
         if item.alt_m:
-            self._note(item, "alt_m", item.alt_m, 0, "a safehome has no height: see nav_rth_altitude", News.NOTICE)
+            self._note(item, "alt_m", item.alt_m, 0, "safehomes lack a height: see nav_rth_altitude", News.NOTICE)
         self._places.append((item.lat_e7 or 0, item.lon_e7 or 0))
         return None
 

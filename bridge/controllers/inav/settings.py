@@ -39,7 +39,7 @@ _TRIES = 3
 _SOME = (Msp.INAV_EZ_TUNE, Msp.PID_V2, Msp.MODE_RANGES, Msp.INAV_RATE_PROFILE, Msp.INAV_MISC)
 _KINDS = {InavType.FLOAT: ValueKind.FLOAT, InavType.STRING: ValueKind.TEXT}
 #: Disarmed motors get these pulses.
-_LOWERED_ONLY = {"min_command": "it can only be lowered, disarmed motors get this pulse"}
+_LOWERED_ONLY = {"min_command": "it can only be lowered, because disarmed motors get this pulse"}
 _FIXED = {"3d_neutral": "disarmed motors get this pulse: set it with INAV Configurator"}
 
 
@@ -52,7 +52,7 @@ class InavFcSettings(FcSettings):
         self._some: list[bytes] | None = None
 
     def read(self, previous: SettingTable | None, reading: TableReading) -> Conversation[SettingTable | None]:
-        """INAV has no checksum: while none changes of some settings, the others are taken to be the same."""
+        """INAV lacks a checksum: while none changes of some settings, the others are taken to be the same."""
         some = yield from self._ask_some()
         if some is None:
             return None

@@ -27,7 +27,7 @@ def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure,
     if blocked and blocked[0]:
         # A list is rejected only if INAV would not arm where the craft is or at the list's home.
         news = None if all(blocked) else News.DANGER
-        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: it does not arm", news)
+        yield Judgement(None, "", f"{departure.name.capitalize()} is {blocked[0]}: INAV does not arm", news)
     for zone in zones:
         if not zone.is_inclusive:
             near = [leg for leg in path.legs if _shares_height(zone, leg)]
@@ -42,7 +42,7 @@ def judge_zones(zones: Sequence[Geozone], path: FlownPath, departure: Departure,
 
 def _met(legs: Sequence[Leg], what: str, action: int) -> Iterable[Judgement]:
     if not action:
-        yield from first_of([(leg.cause, f"{what}: flown, no action is set") for leg in legs], "lat_e7", News.NOTICE)
+        yield from first_of([(leg.cause, f"{what}: crossed, no action is set") for leg in legs], "lat_e7", News.NOTICE)
         return
     for leg in legs[:1]:
         stops = f"{'returns' if action == FenceAction.RTH else 'stops'} at {what} if ANGLE is on"

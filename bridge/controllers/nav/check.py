@@ -227,7 +227,7 @@ class NavCheck(ListCheck):
     def _refuse_without_legs(self) -> RejectingFinding | None:
         if any(record.action in LEGS for record in self._records):
             return None
-        return reject_list(MissionResult.INVALID, self._count, "no waypoint is left to fly to")
+        return reject_list(MissionResult.INVALID, self._count, "no waypoint to fly to")
 
     def _cut(self, size: int, why: str) -> None:
         """Drop the last records, from place `size` on."""
@@ -272,7 +272,7 @@ class NavCheck(ListCheck):
         items = items_from_records(records, self._home, self._sent_as)
         if lost := Counter(name for old in self._rules.current for name in _unshown(old)):
             names = ", ".join(f"{name} ({count})" for name, count in lost.items())
-            why = f"Lost with the old list, as no MAVLink item can show it: {names}"
+            why = f"Lost with the old list, because MAVLink items cannot show it: {names}"
             self._say(why)
         findings = tuple(sorted(self._findings, key=lambda finding: finding.seq or 0))
         seqs = sent_seqs(records, [item.seq for item in self._sent], self._speed.changed_at)
@@ -302,7 +302,7 @@ class NavCheck(ListCheck):
             self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
         if rule.height is AltitudeUse.RTH:
             if alt_cm < 0:
-                self._note(item, "alt_m", item.alt_m, 0, "0 = its own RTH altitude", News.WARNING)
+                self._note(item, "alt_m", item.alt_m, 0, "0 = the board's RTH altitude", News.WARNING)
             return max(alt_cm, 0), 0
         above_sea = item.frame in SEA_LEVEL_FRAMES
         counts_from_sea = above_sea and self._profile.sea_level

@@ -66,7 +66,7 @@ class NavMissions(FcMissionStore[NavRecord], ABC):
         self._vehicle = vehicle
         assert controller.arm_bit is not None
         self._arm_bit = controller.arm_bit
-        #: The flight controller's list, as last read; None if unknown, or one that cannot be flown.
+        #: The flight controller's list, as last read, or None if unknown, or one that cannot be flown.
         self._known: tuple[NavRecord, ...] | None = None
 
     def report(self) -> Conversation[StoreReport | None]:

@@ -28,13 +28,13 @@ HOLD = Range(0, ENDLESS_S - 1, f"seconds 0..{ENDLESS_S - 1}")
 
 @dataclass(frozen=True, slots=True)
 class NavProfile:
-    """The differences between INAV, whose values are the defaults, and MultiWii NAV. INAV stores no POSHOLD_UNLIM.
+    """The differences between INAV, whose values are the defaults, and MultiWii NAV. INAV does not store POSHOLD_UNLIM.
 
     capacity: records, without home. endless_hold: action and p1 of an endless hold. sea_level: altitudes may refer to
     mean sea level. leg_speed: legs may have a speed. rth_height: an RTH may have an altitude. jumps_back_only: a JUMP
     must go back, and no other may be in its loop. If False, it may go to any leg that is not adjacent. longest_hold: s.
     ends_on_any_record: the end of a list is noticed on a SET_POI or SET_HEAD, too. own_rth_landing: an RTH's own p1
-    decides if it lands, else the last record's p1 does. limits: its own settings; None if unknown.
+    decides if it lands, else the last record's p1 does. limits: its own settings, or None if unknown.
     """
 
     capacity: int = INAV_CAPACITY
@@ -131,11 +131,11 @@ class Jumps:
     def _fault(self, place: int, wanted: int, records: list[NavRecord]) -> str | None:
         target = self.places[wanted]
         if target >= len(records):
-            return f"nothing is kept from item {wanted} on"
+            return f"all items from {wanted} on are dropped"
         if records[target].action not in LEGS:
             return f"item {wanted} is not a waypoint"
         if self.back_only:
-            return None if target < place else "it can only jump back"
+            return None if target < place else "jumps can only go back"
         if place == 0 or abs(target - place) < _NEAREST:
             return "it cannot jump to an adjacent item"
         return None

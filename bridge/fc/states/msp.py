@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The states of an MSP line: the board is being identified, or polled, or in its command line."""
+"""The states of an MSP line: the board is being identified, or polled, or in the command line."""
 
 from collections.abc import Sequence
 

@@ -6,7 +6,7 @@ speak MAVLink only. So the search listens for both, but probes for MSP and prefe
 
 Each visit to a speed first only listens, then probes as well. An MSP reply is confirmed by a second one. Evidence is
 two equal replies to our own probes, an autopilot's heartbeat, or two MAVLink frames of one autopilot. Noise
-produces none of them (test_autosense_noise.py). A board that echoes our probes is in its command line.
+produces none of them (test_autosense_noise.py). A board that echoes our probes is in the command line.
 Only whole IDENT requests are ever sent. At a wrong speed the flight controller receives different bytes;
 test_probe_at_wrong_speed.py shows that none of them makes a run that Harakiri acts on.
 """

@@ -34,7 +34,7 @@ _COLOURS = {Grade.OK: "green", Grade.NOTE: "yellow", Grade.PROBLEM: "red"}
 @click.option("--state-dir", type=PATH, help="The daemon's folder for missions.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line for each check.")
 def doctor(fc: str | None, config: Path | None, state_dir: Path | None, as_json: bool) -> None:
-    """Diagnose problems of this machine, each with its remedy.
+    """Diagnose problems of this machine, each with a remedy.
 
     Changes nothing, and does not disturb a running daemon. Exit code 1: a problem was found.
     """

@@ -84,7 +84,7 @@ def _silent(fc: FcAddress, status: Json, source: str) -> Checked:
     """The likely cause, by what arrives on the line."""
     heard = status.get("fc_bytes_received") or 0
     if not heard:
-        return _unheard(fc, f"no reply on {fc}: {status['state']}, and not one byte was received")
+        return _unheard(fc, f"no reply on {fc}: {status['state']}, and no bytes were received")
     if isinstance(fc, SerialFc) and fc.baud is not None:
         found = Fault.WRONG_SPEED(fc=fc, heard=heard, baud=fc.baud, set_fc=fc_remedy(fc.path, source))
         return problem("flight controller", *found, fc_fix(source))

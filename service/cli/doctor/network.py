@@ -74,7 +74,7 @@ def _check_port(host: Host, transport: str, port: int, *, is_running: bool) -> C
     if holder is not None and holder.is_naze_bridge:
         return ok("listening port", f"{what} is the running daemon's")
     if holder is None and os.geteuid() and is_running:
-        return ok("listening port", f"{what} is in use; only root sees by which program")
+        return ok("listening port", f"{what} is in use; only root can see by which program")
     if holder is None and os.geteuid():
         return problem("listening port", *Fault.HIDDEN_LISTENER(what=what))
     if holder is None:
@@ -84,7 +84,7 @@ def _check_port(host: Host, transport: str, port: int, *, is_running: bool) -> C
 
 
 def is_blocked(rules: str, transport: str, port: int) -> bool:
-    """True if the chain for arriving packets drops all that no rule accepts, and no rule names the port."""
+    """True if the chain for arriving packets drops all packets without a rule, and the port does not have one."""
     allowed = re.findall(rf"\b{transport} dport (?:\{{([^}}]*)\}}|([\d-]+))[^\n]*\baccept", rules)
     if any(_covers(part, port) for several, one in allowed for part in (several or one).split(",")):
         return False
@@ -139,5 +139,5 @@ def check_zenoh(settings: ZenohSettings | None) -> Checked:
     me = f"{settings.prefix}/{settings.vehicle}"
     endpoints = connect_endpoints(config)
     if not endpoints:
-        return ok("zenoh", f"{me}, opens no connections")
-    return ok("zenoh", f"{me}, connects to {', '.join(endpoints)}; the log of the daemon says if they refuse")
+        return ok("zenoh", f"{me}, does not open connections")
+    return ok("zenoh", f"{me}, connects to {', '.join(endpoints)}; the daemon's log shows whether they refuse")

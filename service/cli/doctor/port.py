@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks of the flight controller's serial port: it exists, the bridge may use it, and no other program does."""
+"""Checks of the flight controller's serial port: it exists, the bridge may use it, and other programs do not."""
 
 import grp
 import re
@@ -25,7 +25,7 @@ _BLUETOOTH = ("hciattach", "btattach")
 def fc_remedy(port: str, source: str) -> str:
     """The way to set `fc` so that it takes effect. `source`: where it is set now: "FILE:LINE", "--fc" or ""."""
     if source == "--fc":
-        return f"leave --fc out, or give it {port}"
+        return f"omit --fc, or give it {port}"
     if not source or SETUP_FILE in source or PAGE_FILE in source:
         return f"sudo naze-bridge setup --fc {port}"
     return f'write fc = "{port}" in {source} (the line decides), then: sudo systemctl restart naze-bridge'
@@ -39,7 +39,7 @@ def fc_fix(source: str) -> str:
 def check_port(host: Host, fc: FcAddress, source: str = "") -> Checked:
     """Check that the port exists. `source`: where `fc` is set, as in `Settings.sources`."""
     if not isinstance(fc, SerialFc):
-        return ok("port", f"{fc}, no serial port")
+        return ok("port", f"{fc}, not a serial port")
     device = host.resolve(fc.path)
     model = pi_model(host)
     if model is not None and fc.path == "/dev/serial0" and str(device) == "/dev/ttyAMA10":
@@ -113,7 +113,7 @@ def check_console(host: Host, fc: FcAddress) -> Checked | None:
     if not found:
         return ok("console", f"no login console on {device}")
     sentences, remedies = zip(*found, strict=True)
-    return problem("console", f"a login console has {device}: {'; '.join(sentences)}", "; then ".join(remedies), fix)
+    return problem("console", f"a login console uses {device}: {'; '.join(sentences)}", "; then ".join(remedies), fix)
 
 
 def check_holder(host: Host, fc: FcAddress, source: str = "") -> Checked | None:

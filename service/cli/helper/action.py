@@ -19,7 +19,7 @@ _ENDING = ("restart", "try-restart", "disable", "stop")
 
 
 class HelperRefusal(Exception):
-    """A request that is not carried out; one sentence."""
+    """A request that is not carried out, in one sentence."""
 
 
 class DeferredRestarts(Machine):
@@ -60,10 +60,10 @@ def parse_action(line: bytes, actions: Mapping[str, Action]) -> partial[Json]:
     """Read a request; HelperRefusal if it is none, or has an argument that is missing, unknown or of another type."""
     try:
         request: Json = json.loads(line)
-        json.dumps(request, ensure_ascii=False).encode()  # lone surrogates are no text
+        json.dumps(request, ensure_ascii=False).encode()  # lone surrogates are not text
         action = actions[request.pop("action")]
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise HelperRefusal(f"This is not an action; known are {', '.join(actions)}") from None
+        raise HelperRefusal(f"This is not an action; there are {', '.join(actions)}") from None
     known = {name: each for name, each in signature(action).parameters.items() if each.kind is each.KEYWORD_ONLY}
     required = {name for name, each in known.items() if each.default is each.empty}
     if not required <= request.keys() <= known.keys() or any(

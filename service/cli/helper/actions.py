@@ -61,10 +61,10 @@ def doctor(pi: ThisPi) -> Json:
 
 
 def apply_fix(pi: ThisPi, *, fix: str) -> Json:
-    """One of the remedies in service/cli/doctor/fixes.py, by its name."""
+    """One of the remedies in service/cli/doctor/fixes.py, by name."""
     step = fix_step(fix, pi.host)
     if step is None:
-        raise HelperRefusal("This remedy has nothing to change here: check again.")
+        raise HelperRefusal("There is nothing to change here any more: check again.")
     return pi.make([step])
 
 

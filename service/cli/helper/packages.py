@@ -146,7 +146,7 @@ def update(package: Path, host: Host, machine: Machine, sleep: Callable[[float],
 
 
 def pack_installed(package: Path, host: Host, machine: Machine) -> str | None:
-    """Pack the installed files as the package that they came from; returns the version."""
+    """Pack the installed files as the package that they came from. Returns the version."""
     root = package.with_suffix(".tree")
     shutil.rmtree(root, ignore_errors=True)
     control = root / "DEBIAN"

@@ -28,7 +28,7 @@ _LABELS = {
     "takeoff_max_m": ("Highest take-off", "m"),
     "record_tlog": ("Record telemetry", ""),
     "tlog_total_mb": ("Size of all telemetry logs", "MB"),
-    "log_level": ("Log from severity", ""),
+    "log_level": ("Minimum log level", ""),
 }
 _KEYS: Mapping[str, Key] = {key.name: key for key in KEYS if key.name in _LABELS}
 

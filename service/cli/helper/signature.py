@@ -43,7 +43,7 @@ def _tail(package: Path) -> bytes:
 
 
 def check_signature(package: Path, signers: Path) -> None:
-    """Check the signature of a package, and remove it. Raises HelperRefusal if it is missing, or of no known key.
+    """Check the signature of a package, and remove it. Raises HelperRefusal if it is missing, or of an unknown key.
 
     What is left is exactly what was signed. Only then is the package read.
     """
@@ -65,5 +65,5 @@ def check_signature(package: Path, signers: Path) -> None:
             raise HelperRefusal("The signature could not be checked in time: send the package again.") from None
     if done.returncode:
         raise HelperRefusal(
-            "The signature of this package is wrong: it was changed, or is not of naze-bridge's releases."
+            "The signature of this package is wrong: it was changed, or is not from naze-bridge's releases."
         )

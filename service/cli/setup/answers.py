@@ -39,7 +39,7 @@ class SetupChoices:
 
 
 def earlier_choices(host: Host) -> SetupChoices | None:
-    """The answers of the last setup that have no other file, or None on a machine that was never set up."""
+    """The answers of the last setup that lack another file, or None on a machine that was never set up."""
     text = host.read(SETTINGS_FILE)
     if not text:
         return None

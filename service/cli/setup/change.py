@@ -12,7 +12,7 @@ from storage.small_files import replace_file
 
 
 class SetupError(Exception):
-    """A change that failed; one sentence."""
+    """A change that failed, in one sentence."""
 
 
 @dataclass(frozen=True, slots=True)

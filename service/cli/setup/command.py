@@ -56,7 +56,7 @@ _HOST_NAME = re.compile("[A-Za-z0-9](?:[A-Za-z0-9-]{0,61}[A-Za-z0-9])?")
 @click.option("--page/--no-page", default=None, help="Serve the status page, or not.")
 @click.option("--key-file", type=PATH, help="File with a MAVLink signing passphrase: required for changes.")
 @click.option("--new-key", is_flag=True, help="Make such a passphrase and show it; it replaces the present one.")
-@click.option("--yes", is_flag=True, help="Ask no questions: use the options, the last answers and the defaults.")
+@click.option("--yes", is_flag=True, help="Do not ask questions: use the options, the last answers and the defaults.")
 @click.option("--dry-run", is_flag=True, help="Show the changes without making them.")
 @click.option("--root", type=PATH, default="/", hidden=True)
 def setup(
@@ -75,8 +75,8 @@ def setup(
 ) -> None:
     """Set this Raspberry Pi up: UART, settings, Wi-Fi, status page, service.
 
-    May be run again at any time: earlier answers are kept, and an option changes one. Exit code 1: a change failed, or
-    doctor found a problem.
+    May be run again at any time: earlier answers are kept unless an option changes them. Exit code 1: a change failed,
+    or doctor found a problem.
     """
     if not (yes or dry_run or is_root()):
         fail(Fault.NOT_ROOT.text())  # before the questions
@@ -170,7 +170,7 @@ def _print_kept(host: Host, fc: str | None, *, page: bool) -> None:
         "a key is required for changes" if current_key(host) else "no key: anyone on the network can make changes",
         *([f"hotspot {hotspot!r}"] if hotspot else []),
     ]
-    click.echo(f"Set up before: {', '.join(kept)}. Options change this: naze-bridge setup --help")
+    click.echo(f"Already set up: {', '.join(kept)}. To change this, use options: naze-bridge setup --help")
 
 
 def _show(host: Host, steps: list[Step]) -> None:

@@ -145,7 +145,7 @@ def open_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = 
 
 
 def close_hotspot(host: Host, machine: Machine, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Close the hotspot until it is opened again. It stays open where the Pi has no other network."""
+    """Close the hotspot until it is opened again. It stays open where the Pi lacks another network."""
     _open_at_boot(host, machine, is_on=False)
     machine.run(("nmcli", "connection", "down", CONNECTION))
     for _ in range(_LEAVE_S):

@@ -104,7 +104,7 @@ export async function showConnect() {
   if (text === connectShown) return;
   connectShown = text;
   const links = help.stations.map(({ connection, hosts, port }) => make("li", {}, make("b", {}, connection), `: host ${hosts.join(" or ")}, port ${port}`));
-  const others = help.called.map((address) => make("li", {}, `The Pi itself calls ${address}`));
+  const others = help.called.map((address) => make("li", {}, `The Pi itself connects to ${address}`));
   const page = help.pages.length ? `This page: ${help.pages.join(" or ")}` : "Only this machine can open this page: run setup to open it to the network.";
   byId("connect").replaceChildren(make("p", {}, "In Mission Planner choose the connection at the top right:"), make("ul", {}, ...links, ...others), make("p", {}, page));
 }

@@ -87,7 +87,7 @@ function settings(pi) {
     await open();
     return text;
   };
-  return fold("Settings of the bridge", false, make("p", { class: "soft" }, "An empty field has its default."),
+  return fold("Settings of the bridge", false, make("p", { class: "soft" }, "An empty field means the default."),
     form({}, () => pressed(save, said, write), make("div", { class: "fields" }, ...rows.map(({ element }) => element)), make("div", { class: "row" }, save, said)));
 }
 
@@ -106,11 +106,11 @@ const word = (value) => ({ true: "Yes", false: "No" })[String(value)] ?? String(
 // An update from a file. A connection to the Pi is short, so the package is sent in pieces.
 function updates({ version, previous, can_update: canUpdate }) {
   const said = resultPlace(), bar = make("progress", { hidden: "", "aria-label": "Package sent" });
-  if (!canUpdate) return fold("Update", false, make("p", {}, `This is version ${version}. It was built without a key that updates could be checked by: install a package with apt in a terminal.`));
+  if (!canUpdate) return fold("Update", false, make("p", {}, `This is version ${version}. It was built without a key for checking updates: install a package with apt in a terminal.`));
   const file = make("input", { type: "file", accept: ".deb" }), send = make("button", {}, "Install");
   const update = form({}, () => pressed(send, said, () => install(file.files[0], bar, said)), make("label", {}, "Package (.deb) ", file), make("div", { class: "row" }, send, bar, said));
   const back = previous ? [action(`Back to version ${previous}`, said, () => askPi({ action: "downgrade" }).then(() => LATER))] : [];
-  return fold("Update", false, make("p", {}, `This is version ${version}. A newer package from the releases is installed if its signature is right. If the new version does not run, this one is reinstalled.`), update, ...back);
+  return fold("Update", false, make("p", {}, `This is version ${version}. A newer package from the releases is installed if its signature is valid. If the new version does not run, this one is reinstalled.`), update, ...back);
 }
 
 async function install(file, bar, said) {

@@ -51,11 +51,11 @@ function headline(state) {
   return [state.last_heard.mode, state.battery.voltage_v && `${state.battery.voltage_v.toFixed(1)} V`, state.link.flight_controller].filter(Boolean).join(", ");
 }
 
-// The state of the wires while no frame arrives. Between two states the search listens at one or two speeds.
+// The state of the wires until a frame arrives. Between two states the search listens at one or two speeds.
 export function evidence({ bytes_received }) {
   const arrives = heard !== null && bytes_received > heard.bytes;
   if (heard === null || bytes_received !== heard.bytes || performance.now() - heard.at > LISTEN_MS) heard = { bytes: bytes_received, at: performance.now(), arrives };
-  return heard.arrives ? "bytes arrive, but no frames. Is the speed right, and MSP on at this UART?" : "silence. Check power, TX to RX, RX to TX, and GND.";
+  return heard.arrives ? "bytes arrive, but no frames. Is the speed right, and is MSP enabled on this UART?" : "silence. Check power, TX to RX, RX to TX, and GND.";
 }
 
 function showTransfer(transfer) {

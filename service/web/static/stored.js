@@ -45,7 +45,7 @@ function restore(number, plan) {
   const out = plan.left_out.map(({ name, why }) => make("li", {}, `${name}: ${why}`));
   const leftOut = out.length ? [make("p", {}, "These cannot be restored:"), make("ul", {}, ...out)] : [];
   const notice = plan.notice ? [make("p", { class: "bad" }, plan.notice)] : [];
-  if (!plan.changes.length) return [make("p", {}, "The flight controller has these settings."), ...leftOut];
+  if (!plan.changes.length) return [make("p", {}, "The flight controller already has these settings."), ...leftOut];
   const rows = plan.changes.map(({ name, was, becomes }) => [name, was, becomes]);
   const label = `Restore and save ${rows.length} ${rows.length === 1 ? "setting" : "settings"}`;
   return [values("Restoring would change", rows, ["Now", "Restored"]), ...leftOut, ...notice,

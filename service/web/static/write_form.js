@@ -51,7 +51,7 @@ function follow(form, { write, transfer }) {
   form.id = null;
   form.bar.hidden = true;
   if (isOurs) say(form.result, write.ok ? "good" : "bad", write.text);
-  else say(form.result, "bad", "The page no longer has the result of this write: see the stored missions and settings.");
+  else say(form.result, "bad", "The result of this write is no longer available here: see the stored missions and settings.");
   block(form);
 }
 

@@ -42,7 +42,7 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
     multiwii.answers = {**multiwii.answers, 122: nav_config(60, 100, 25, wp_radius=900)}
     assert Upload(station, sent).run() is ACCEPTED
     texts = " ".join(station.texts())
-    assert "flown at 25 m, its nav_max_altitude" in texts
+    assert "flown at 25 m (nav_max_altitude)" in texts
     assert "WP 5: leg of 100 m or more: stops there (+1)" in texts
     assert "WP 7: passes the ROI within 14 m: may end there" in texts
 

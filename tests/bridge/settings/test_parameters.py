@@ -286,7 +286,7 @@ def test_a_setting_is_set_on_the_board_and_sent_to_all() -> None:
         (b"p_roll", 40.5, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: a whole number, 1..200"),
         (b"p_roll", math.nan, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
         (b"p_roll", math.inf, 35.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "P_ROLL stays 35: 1..200"),
-        (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "GBL_FLG stays 1: a running Harakiri can crash"),
+        (b"gbl_flg", 3.0, 1.0, m.MAV_PARAM_ERROR_READ_ONLY, "GBL_FLG stays 1: changing it can crash a running"),
         (b"LED_Pattern1", 2.0**24, 1300.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "only up to 16777215 over"),
         (b"WPNAV_RADIUS", 2001.0, 200.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "WPNAV_RADIUS stays 200: 0..2000 cm"),
         (b"WPNAV_RADIUS", math.nan, 200.0, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, "WPNAV_RADIUS stays 200: 0..2000"),

@@ -130,7 +130,7 @@ def test_home_alone_is_invalid() -> None:
     """Mission Planner's empty Write; a count of 1 is first answered with a request for the item."""
     world, station = holding()
     assert Upload(station, waypoints(1)).run() is A.INVALID
-    assert "Mission rejected: only a home point, no command" in station.texts()
+    assert "Mission rejected: only home, without a command" in station.texts()
     assert_refusal_is_repeated(world, station, A.INVALID)
     assert world.stored == OLD_RECORDS
 
@@ -488,7 +488,7 @@ def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
     world.wait_until(lambda _: bool(acks(station)), 10)
     assert world.now - began == pytest.approx(5.0, abs=0.05)
     assert acks(station) == [A.OPERATION_CANCELLED]
-    assert any("silent for 5 s" in text for text in station.texts())
+    assert any("stalled for 5 s" in text for text in station.texts())
     times = [at - began for at, message in station.received if message.get_type() == "MISSION_REQUEST"]
     assert set(requested(station)) == {sent}
     assert times[0] == pytest.approx(0.25, abs=0.05)

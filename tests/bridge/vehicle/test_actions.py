@@ -68,7 +68,7 @@ def test_an_action_is_done_once_on_the_ground(
     world.run(0.6)
     assert results(station) == [IN_PROGRESS]
     assert done(world) == [action]
-    assert station.texts()[-1] == "Calibrating: it restarts when done (up to 5 min)"
+    assert station.texts()[-1] == "Calibrating: the board then reboots (up to 5 min)"
     world.run(20)
     # The board restarts after a calibration and is found again.
     assert world.naze.counters.resets == (action == 205)

@@ -119,7 +119,7 @@ def test_cancelling_a_frozen_compass_calibration_is_refused() -> None:
     assert pages.acks(CANCEL_MAG_CAL) == [ACCEPTED, DENIED]
     assert pages.acks(START_MAG_CAL) == [ACCEPTED, IN_PROGRESS]
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [TEMPORARILY_REJECTED]
-    assert any("Not cancelled" in text for text in pages.station.texts())
+    assert any("Cannot be cancelled" in text for text in pages.station.texts())
 
 
 def test_a_compass_calibration_cut_by_a_reset_has_failed() -> None:

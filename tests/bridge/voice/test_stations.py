@@ -109,7 +109,7 @@ def test_a_lost_text_reaches_mission_planner_later() -> None:
     station.radio.loss = 0.0
     station.take()
     world.run(6)
-    assert "Upload silent for 5 s, old mission kept" in station.texts()
+    assert "Upload stalled for 5 s, old mission kept" in station.texts()
     heard = len(station.texts())
     world.run(10)
     assert len(station.texts()) <= heard + 1

@@ -42,7 +42,7 @@ def test_a_file_of_another_kind_of_plan_is_refused_by_the_name() -> None:
         (b"FMT, 128, 89, FMT, BBnNZ, Type\n", "a flight log"),
         (b"0\t1\t0\t16\t0\t0\t0\t0\t51.4\t0.1\t46\t1\n", "items without the header; write QGC WPL 110 into a line"),
         ("Breite;Länge;Höhe\n51,4;0,1;30\n".encode(), "latitude and longitude; name the columns in the first line"),
-        (b"Hello pilot,\n", "no mission begins with 'Hello pilot,'; save the mission as QGC WPL 110"),
+        (b"Hello pilot,\n", "a mission does not begin with 'Hello pilot,'; save the mission as QGC WPL 110"),
         (b"RALLY 51.4 0.1 20 0 0 0\n", "rally points; give the mission's own file"),
     ],
 )

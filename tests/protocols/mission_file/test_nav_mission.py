@@ -74,12 +74,12 @@ def test_a_speed_and_a_height_above_the_sea_are_kept() -> None:
         (f"<mission>{ITEM.replace('15', '1e12')}</mission>", "alt is '1e12', not a number"),
         (f"<mission>{ITEM}{ITEM.replace('parameter1', 'flag')}", "this XML is damaged"),
         (f"<!DOCTYPE m [<!ENTITY a 'b'>]><mission>{ITEM}</mission>", "delete the line that begins with <!DOCTYPE"),
-        ("wp 0 1 51 12 15 0 0 0 165\nwp 1 4 0 0 0 0 0 0 165\n", "holds 2 missions"),
+        ("wp 0 1 51 12 15 0 0 0 165\nwp 1 4 0 0 0 0 0 0 165\n", "contains 2 missions"),
         ("wp 0 1 51 12 15 0 0 165\n", "line 1: 'wp 0 1 51 12 15 0 0 165... is not a waypoint"),
         ("wp 0 1 51 12 15 0 0 0 0\nwp 1 1 51477", "line 2: 'wp 1 1 51477' is not a waypoint"),
         ("wp 0 1 51.4771 0.0012 15 0 0 0 165\n", "line 1: 'wp 0 1 51.4771 0.0012 1... is not a waypoint"),
         ("wp 0 99 51 12 15 0 0 0 165\n", "line 1: its action is 99; use one of WAYPOINT (1)"),
-        ("<svg/>", "this XML holds <svg>"),
+        ("<svg/>", "this XML contains <svg>"),
     ],
 )
 def test_refuses_with_the_place_and_a_remedy(text: str, words: str) -> None:

@@ -82,7 +82,7 @@ def test_a_zip_bomb_is_refused_before_it_is_unpacked(method: int) -> None:
     bomb = zipped("<kml>" + " " * (16 << 20), method)
     assert len(bomb) < 1 << 17
     tracemalloc.start()
-    with pytest.raises(MissionFileError, match=r"longer than 2 MB|holds no KML"):
+    with pytest.raises(MissionFileError, match=r"longer than 2 MB|does not contain a KML"):
         read(bomb)
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -108,13 +108,13 @@ def test_a_path_without_heights_needs_an_altitude(text: str) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (kml(POINTS, before="<LineString><coordinates>0,0,1 1,1,1</coordinates></LineString>"), "holds 2 paths"),
-        (gpx(track("trk", "trkpt") * 2), "holds 2 tracks"),
+        (kml(POINTS, before="<LineString><coordinates>0,0,1 1,1,1</coordinates></LineString>"), "contains 2 paths"),
+        (gpx(track("trk", "trkpt") * 2), "contains 2 tracks"),
         (kml("0.0012;51.4771;30"), "point 1: '0.0012;51.4771;30' is not LON,LAT,ALT"),
         (kml("0.0012,north,30"), "the latitude is 'north'"),
         ("<kml><Polygon><coordinates>1,2,3</coordinates></Polygon></kml>", "draw a path, not an area"),
-        (gpx(""), "the file holds no path"),
-        (kml("0,0012,51,4771,30"), "point 1: '0,0012,51,4771,30' is not LON,LAT,ALT; write decimal points"),
+        (gpx(""), "the file does not contain a path"),
+        (kml("0,0012,51,4771,30"), "point 1: '0,0012,51,4771,30' is not LON,LAT,ALT; use decimal points"),
         (gpx(track("rte", "rtept")).replace("51.4771", "51,4771"), "point 1: '51,4771' has a decimal comma"),
         ("latitude,longitude,altitude(m)\n51.4771,0.0012\n", "line 2: 2 columns, but 3 titles"),
         ("latitude,longitude,altitude(m)\n51,4771,0,0012,30\n", "line 2: 5 columns, but 3 titles"),

@@ -102,8 +102,8 @@ def test_mission_planners_own_json_is_read() -> None:
 @pytest.mark.parametrize(
     ("part", "notes"),
     [
-        ({"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["the plan also holds a fence: ignored"]),
-        ({"rallyPoints": {"points": [[1, 2, 3]]}}, ["the plan also holds rally points: ignored"]),
+        ({"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["the plan also contains a fence: ignored"]),
+        ({"rallyPoints": {"points": [[1, 2, 3]]}}, ["the plan also contains rally points: ignored"]),
         ({}, []),
     ],
 )
@@ -160,11 +160,11 @@ def test_a_plan_is_recognised_by_the_contents() -> None:
         (plan(home=[1, "2", 3]), ["plannedHomePosition", "'2'"]),
         (plan(home=[1, 2, 3, 4]), ["plannedHomePosition"]),
         ({"version": "1.0", "items": []}, ["of version '1.0'", "open it in QGroundControl and save it as .plan"]),
-        (plan(simple()) | {"version": 2}, ["the plan is of version 2", "only 1 can be read"]),
+        (plan(simple()) | {"version": 2}, ["the plan has version 2", "only 1 can be read"]),
         (plan(simple(), version=3), ["its mission is of version 3"]),
-        (plan() | {"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["holds a fence and no mission"]),
-        (plan() | {"rallyPoints": {"points": [[1, 2, 3]]}}, ["holds rally points and no mission"]),
-        (plan(simple(5001)), ["holds a fence"]),
+        (plan() | {"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["contains a fence but not a mission"]),
+        (plan() | {"rallyPoints": {"points": [[1, 2, 3]]}}, ["contains rally points but not a mission"]),
+        (plan(simple(5001)), ["contains a fence"]),
     ],
 )
 def test_a_damaged_plan_is_refused_with_the_position_of_the_error(document: Any, words: list[str]) -> None:

@@ -166,7 +166,7 @@ def test_a_list_without_home_keeps_the_first_item_if_home_is_given(tmp_path: Pat
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
-    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be alone" in run(files["rejected"]).stdout
+    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be the only" in run(files["rejected"]).stdout
     assert "CLEARED: MAV_MISSION_ACCEPTED, Mission erased" in run(files["cleared"]).stdout
 
 
@@ -205,10 +205,13 @@ def test_an_inavs_saved_settings_decide_about_the_missions(tmp_path: Path) -> No
     dump.write_text("# INAV\nset nav_max_altitude = 2000\n")
     found = run("--kind", "inav", "--settings", dump, mission)
     assert found.exit_code == 1
-    assert "WP 1: nav_max_altitude is 20 m, it would not climb to 30 m" in found.stdout
+    assert "WP 1: nav_max_altitude is 20 m: INAV would not climb to 30 m" in found.stdout
     dump.write_text("NVMAXALT,0\nnav_max_altitude,3000\n")
     assert run("--kind", "inav", "--settings", dump, mission).exit_code == 0
-    for text, wrong in (("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"), ("", "holds no settings")):
+    for text, wrong in (
+        ("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"),
+        ("", "does not contain settings"),
+    ):
         dump.write_text(text)
         refused = run("--kind", "inav", "--settings", dump, mission)
         assert refused.exit_code == 2

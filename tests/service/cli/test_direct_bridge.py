@@ -47,7 +47,7 @@ def test_a_tcp_port_without_a_listener_is_reported_in_one_sentence() -> None:
     assert_one_sentence(
         run_naze_bridge("pull", "--fc", "tcp:127.0.0.1:9"),
         1,
-        "9 cannot be reached: Connection refused; is it switched on, and the port right?",
+        "9 cannot be reached: Connection refused; is it switched on, and is the port right?",
     )
 
 

@@ -56,7 +56,7 @@ prefixes = "fleet"
         "naze.toml:4: 'tcpin:0.0.0.0' needs a host and a port; use udpin:0.0.0.0:14550",
         "setup.toml:1: tlog_total_mb is 'all', but must be a whole number, 2..1048576 (Size",
         "naze.toml:3: sysid is 300, but must be 1..255 (MAVLink system id of the vehicle",
-        "naze.toml:10: zenoh.vehicle is 'a/b': make a name of at most 64 letters, digits and dashes",
+        "naze.toml:10: zenoh.vehicle is 'a/b': use at most 64 letters, digits and dashes",
     ]
     assert [line[: len(words)] for line, words in zip(lines, wanted, strict=True)] == wanted
 

@@ -51,7 +51,7 @@ def test_a_check_names_the_other_contents_of_the_file(web: WebBench) -> None:
     fence = b'"geoFence": {"circles": [{}]}'
     plan = (EXAMPLE.with_suffix(".plan").read_bytes().rstrip()[:-1]) + b"," + fence + b"}"
     answer = post(web, "/api/check?name=field.plan", plan)
-    assert "the plan also holds a fence: ignored" in answer.data["findings"]
+    assert "the plan also contains a fence: ignored" in answer.data["findings"]
 
 
 def test_a_file_is_written_only_with_the_token(web: WebBench) -> None:

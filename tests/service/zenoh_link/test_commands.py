@@ -98,7 +98,7 @@ def test_the_state_and_the_list_of_missions_are_reported(commanded: tuple[Bench,
 
 BAD_PAYLOADS = {
     "nothing": (b"", "the file has no items"),
-    "no mission": (b"<html/>", "this file holds a web page"),
+    "no mission": (b"<html/>", "this file contains a web page"),
     "no text": (b"\xfd\xfe\x00\x01", "a binary file"),
     "half a plan": (b'{"fileType": "Plan", "mission": {', "JSON"),
     "a place in words": (mission_file(5).replace(b"45.384", b"nowhere"), "line 3"),

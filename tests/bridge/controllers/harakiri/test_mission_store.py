@@ -297,7 +297,7 @@ def test_an_identical_list_is_not_written_again() -> None:
 
 def test_an_empty_list_is_not_cleared_again() -> None:
     world = holding_the_old_list(0)
-    for expected in ("Mission on the flight controller cleared", "The flight controller already held no mission"):
+    for expected in ("Mission on the flight controller cleared", "No mission to clear on the flight controller"):
         outcome = world.push([])
         world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
         assert outcome[0][0].text == expected

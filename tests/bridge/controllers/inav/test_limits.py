@@ -37,7 +37,7 @@ def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: An
 
 
 def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None:
-    reason = "200 m from {}, nav_wp_max_safe_distance is 100 m: it would not arm"
+    reason = "200 m from {}, nav_wp_max_safe_distance is 100 m: INAV would not arm"
     assert texts(FAR, NEAR) == [f"Rejected, WP 1: {reason.format('home')}"]
     assert texts(FAR, here=(LAT, LON + 1000)) == [f"Rejected, WP 1: {reason.format('the craft')}"]
     assert texts(NEAR, FAR) == texts(FAR, nav_wp_max_safe_distance=0) == texts(FAR, nav_wp_max_safe_distance=201) == []
@@ -46,7 +46,7 @@ def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None
 def test_the_first_waypoint_is_measured_from_the_craft() -> None:
     """INAV's home is where it is armed, whatever the home of the list."""
     assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == []
-    warning = "WP 1: arms only near the list's home, 250 m off"
+    warning = "WP 1: arms only near the list's home, 250 m away"
     assert texts(NEAR, here=(LAT + NORTH * 5 // 2, LON)) == [warning]
 
 
@@ -58,7 +58,7 @@ def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
 def test_values_that_an_aeroplane_ignores_are_named() -> None:
     yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
     assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, platform=Platform.AEROPLANE)[:2] == [
-        "WP 3: its speed: no effect on an aeroplane (+2)",
+        "WP 3: speed ignored on an aeroplane (+2)",
         "WP 4: no effect on an aeroplane (+1)",
     ]
 
@@ -67,8 +67,8 @@ def test_values_that_an_aeroplane_ignores_are_named() -> None:
 def test_differences_on_a_rover_or_boat_are_named(platform: Platform) -> None:
     hold, land = item(Command.NAV_LOITER_TIME, p1=5.0), replace(FAR, command=Command.NAV_LAND)
     assert sorted(texts(speed(3), NEAR, hold, land, platform=platform)) == [
-        f"WP 2: Alt: no effect on {platform.value} (+2)",
-        f"WP 2: its speed: no effect on {platform.value} (+2)",
+        f"WP 2: Alt ignored on {platform.value} (+2)",
+        f"WP 2: speed ignored on {platform.value} (+2)",
         f"WP 3: {platform.value} drives on while it holds",
         f"WP 4: {platform.value} disarms there",
     ]
@@ -84,7 +84,7 @@ def test_a_far_or_high_flight_is_reported_on_inav_without_limits() -> None:
 
 
 def test_a_leg_that_inav_would_fly_lower_rejects_the_list() -> None:
-    reason = "Rejected, WP 1: nav_max_altitude is 40 m, it would not climb to 50 m"
+    reason = "Rejected, WP 1: nav_max_altitude is 40 m: INAV would not climb to 50 m"
     assert texts(WP, nav_max_altitude=4000) == [reason]
     assert texts(WP, nav_max_altitude=5000) == texts(WP, nav_max_altitude=4000, nav_wp_enforce_altitude=100) == []
     # Home is 123 m above the sea.
@@ -143,7 +143,7 @@ def test_another_selected_mission_is_named() -> None:
     assert texts(WP, selected=2) == ["Stored as mission 1, mission 2 was selected"]
     first = "Stored as mission 1, mission 2 was selected"
     aeroplane: dict[str, Any] = {"platform": Platform.AEROPLANE, "selected": 2}
-    renumbered = f"{first}: each mission lands by the FW approach of its new number"
+    renumbered = f"{first}: each mission lands by the FW approach with the new number"
     assert texts(NEAR, approach=APPROACH, **aeroplane) == [renumbered]
     assert texts(NEAR, **aeroplane) == [first]
 

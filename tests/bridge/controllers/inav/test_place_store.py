@@ -130,7 +130,7 @@ def test_a_board_without_geozones_refuses_a_fence(kind: str, version: str) -> No
 
 @pytest.mark.parametrize(
     ("version", "text"),
-    [("7.1.2", "This flight controller has no fence"), ("9.1.0", "Switch geozones in INAV's own settings")],
+    [("7.1.2", "This flight controller has no fence"), ("9.1.0", "Switch geozones on or off in INAV's settings")],
 )
 def test_a_fence_button_is_refused_according_to_the_board(version: str, text: str) -> None:
     _, world, station = board_with("inav", version=version)

@@ -19,7 +19,7 @@ def test_points_with_a_height_or_without_a_place_are_named() -> None:
     items = [replace(RALLY_ITEMS[0], alt_m=30.0), replace(RALLY_ITEMS[1], lon_e7=0)]
     verdict = check_list(items, RallyRules())
     assert [finding.text() for finding in verdict.findings] == [
-        "Item 0: Alt changed from 30 to 0 m (a safehome has no height: see nav_rth_altitude)",
+        "Item 0: Alt changed from 30 to 0 m (safehomes lack a height: see nav_rth_altitude)",
         "Item 1: RALLY_POINT dropped, no Lat/Long",
     ]
     assert [each.enabled for each in verdict.records] == [True] + 7 * [False]

@@ -110,20 +110,20 @@ def test_only_the_first_stop_is_reported() -> None:
 
 
 def test_a_list_is_rejected_if_inav_would_not_arm_at_home() -> None:
-    inside = "Mission rejected: Home is in geozone 0: it does not arm"
+    inside = "Mission rejected: Home is in geozone 0: INAV does not arm"
     assert texts(circle(0), legs=LEGS) == [inside]
     assert texts(circle(0, lowest_cm=6000), legs=LEGS) == []
-    outside = "Mission rejected: Home is outside geozone 0: it does not arm"
+    outside = "Mission rejected: Home is outside geozone 0: INAV does not arm"
     assert texts(circle(10, is_inclusive=True), legs=LEGS) == [outside]
     # The craft is elsewhere, where it arms.
     assert texts(circle(0), legs=LEGS, here=(LAT - 2 * NORTH, LON))[0] == "WP 1: " + STOPS.format("geozone 0")
     # The craft does not arm where it is, but at the home of the list.
-    warning = "The craft is in geozone 0: it does not arm"
+    warning = "The craft is in geozone 0: INAV does not arm"
     assert texts(circle(-3), legs=LEGS, here=(LAT - 3 * NORTH, LON))[0] == warning
 
 
 def test_a_zone_without_an_action_does_not_stop_a_mission() -> None:
-    assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: flown, no action is set"]
+    assert texts(circle(2, action=FenceAction.NONE), legs=LEGS) == ["WP 2: geozone 0: crossed, no action is set"]
     assert texts(circle(2, action=FenceAction.RTH), legs=LEGS) == ["WP 1: returns at geozone 0 if ANGLE is on"]
 
 

@@ -324,5 +324,5 @@ def test_values_that_items_cannot_show_are_lost_with_a_warning(record: NavRecord
     held = (NavRecord(A.WAYPOINT, LAT, LON, 2000), record, NavRecord(A.RTH, flag=LAST))
     items = list(items_from_records(held, home_item((LAT, LON))))
     verdict = check_list(items, NavRules(NavProfile(), held))
-    expected = [(News.WARNING, f"Lost with the old list, as no MAVLink item can show it: {lost}")] if lost else []
+    expected = [(News.WARNING, f"Lost with the old list, because MAVLink items cannot show it: {lost}")] if lost else []
     assert [(finding.news, finding.text()) for finding in verdict.findings] == expected

@@ -13,10 +13,10 @@ from tests.support.faulty_machine import PORT
 
 
 def test_a_silent_flight_controller_is_a_problem() -> None:
-    assert_problem(check_flight_controller(PORT, None, no_answer), "no flight controller answers", "TX goes to RX")
+    assert_problem(check_flight_controller(PORT, None, no_answer), "no flight controller answers", "Connect TX to RX")
     silent = STATUS | {"flight_controller": None, "state": "searching"}
     (_, found) = check_flight_controller(PORT, silent, None)
-    assert_problem(found, "no reply on /dev/serial0: searching", "TX goes to RX")
+    assert_problem(found, "no reply on /dev/serial0: searching", "Connect TX to RX")
     (_, found) = check_flight_controller(PORT, silent | {"state": "no port"}, None)
     assert_note(found, "/dev/serial0 cannot be opened yet")
 

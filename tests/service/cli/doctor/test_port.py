@@ -20,7 +20,7 @@ def test_a_missing_port_is_a_problem(pi: FaultyMachine) -> None:
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup")
     pi.write("/dev/ttyUSB0")
     assert_problem(check_port(pi, PORT), "/dev/serial0 is missing", "sudo naze-bridge setup --fc /dev/ttyUSB0")
-    assert_problem(check_port(pi, PORT, "--fc"), "/dev/serial0 is missing", "leave --fc out, or give it /dev/ttyUSB0")
+    assert_problem(check_port(pi, PORT, "--fc"), "/dev/serial0 is missing", "omit --fc, or give it /dev/ttyUSB0")
     assert_problem(check_port(pi, SerialFc("/dev/naze", None)), "/dev/naze is missing", "plug the flight controller in")
     # There are no further checks of a missing port.
     assert check_permission(pi, PORT) is check_console(pi, PORT) is check_holder(pi, PORT) is None
@@ -44,7 +44,7 @@ def test_without_a_named_port_the_daemons_own_is_checked(pi: FaultyMachine, tmp_
     pi.path("/dev/serial0").unlink()
     running = STATUS | {"where": "sim:"}
     found = {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), lambda: running, no_answer)}
-    assert_ok(found["port"], "sim:, no serial port")
+    assert_ok(found["port"], "sim:, not a serial port")
     assert_ok(found["flight controller"], "Harakiri")
     searching = running | {"where": "the serial ports", "port": None, "ports_passed_over": []}
     found = {each.check: each for each in examine(pi, Settings(AutoFc(), GCS, tmp_path), lambda: searching, no_answer)}

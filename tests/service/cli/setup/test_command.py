@@ -56,7 +56,7 @@ def test_the_pilot_is_asked_once(pi: Pi) -> None:
     again = pi.setup(answers=go)
     assert again.exit_code == 0, again.output
     assert again.output.count("?") == 1  # Make these changes?
-    before = "Set up before: flight controller auto, status page on, a key is required"
+    before = "Already set up: flight controller auto, status page on, a key is required"
     assert before in again.output
     assert before in pi.setup("--dry-run", "--no-page").output
     assert pi.key_file.read_text() == f"{first}\n"
@@ -118,7 +118,7 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
     for options in (["--key-file", str(file)], ["--key-file", str(file), "--new-key"]):
         assert pi.setup("--yes", *options).exit_code == 2
     file.write_text("x\n")
-    assert "exclude each other" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
+    assert "cannot be used together" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
     assert not pi.key_file.exists()
 
 
@@ -136,7 +136,7 @@ def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
     ],
 )
 def test_an_invalid_password_is_refused(password: str) -> None:
-    with pytest.raises(click.UsageError, match="8 to 63 characters"):
+    with pytest.raises(click.UsageError, match="8 to 63 letters"):
         check_answers("kite", password, "DE", None)
 
 
