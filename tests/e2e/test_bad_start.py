@@ -49,7 +49,7 @@ def test_a_second_daemon_on_one_port_is_refused(start: Starter, tmp_path: Path) 
     [
         # An unknown network interface is found without a name server.
         ("udpin:[fe80::1%no-card]:14550", "check the name and the network"),
-        ("udpin:203.0.113.1:14550", "this machine has no such address"),
+        ("udpin:203.0.113.1:14550", "this machine does not have that address"),
     ],
 )
 def test_an_impossible_link_to_ground_stations_is_reported_in_one_sentence(

@@ -40,4 +40,4 @@ def test_each_vehicle_gets_a_system_id_that_no_other_has(tmp_path: Path) -> None
 def test_beyond_250_vehicles_there_is_no_system_id(tmp_path: Path) -> None:
     has_members(tmp_path, **{f"kite-{number}": {"role": "vehicle"} for number in range(250)})
     enrolled = run_naze_bridge("fleet", "enroll", "owl", "--folder", tmp_path)
-    assert (enrolled.returncode, "No system id is left" in enrolled.stdout) == (0, True)
+    assert (enrolled.returncode, "system ids are in use" in enrolled.stdout) == (0, True)

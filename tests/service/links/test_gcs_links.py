@@ -169,7 +169,7 @@ async def test_a_flight_controller_may_be_behind_tcp(host: str) -> None:
 @pytest.mark.parametrize("kind", ["udpin", "tcpin"])
 async def test_a_link_local_address_keeps_the_interface(links: Links, kind: str) -> None:
     """The loopback has no such address. Without the interface the kernel would call it an invalid argument."""
-    with pytest.raises(LinkError, match="this machine has no such address"):
+    with pytest.raises(LinkError, match="this machine does not have that address"):
         links.open(f"{kind}:[fe80::1%lo]:{free_port()}")
 
 

@@ -104,7 +104,7 @@ BAD_PAYLOADS = {
     "a place in words": (mission_file(5).replace(b"45.384", b"nowhere"), "line 3"),
     "10 MB": (b"x" * 10_000_000, "larger than 256 KiB"),
     "a book": (mission_file(1200), "1200 items"),
-    "a home alone": (mission_file(1), "only a home point"),
+    "a home alone": (mission_file(1), "only home, without a command"),
     "too many": (mission_file(200), "146 fit"),
 }
 

@@ -252,7 +252,7 @@ def test_the_boards_settings_are_read_by_name_and_again_after_a_change() -> None
     client.wait_read()
     client.change("nav_max_altitude", 5000)
     assert Upload(station, legs).run() is MissionResult.INVALID_PARAM7
-    assert "Rejected, WP 2: nav_max_altitude is 50 m, it would not climb to 60 m" in " ".join(station.texts())
+    assert "Rejected, WP 2: nav_max_altitude is 50 m: INAV would not climb to 60 m" in " ".join(station.texts())
     client.change("nav_max_altitude", 6000)
     assert Upload(station, legs).run() is ACCEPTED
 
