@@ -74,13 +74,8 @@ class TokenBucket:
         self._used = 0.0
         self._counted_at = 0.0
 
-    def has(self, now: float) -> bool:
-        self._used = max(0.0, self._used - max(0.0, now - self._counted_at) * self._rate.per_s)
-        self._counted_at = now
-        return self._used + 1.0 <= self._rate.burst
-
-    def spend(self, amount: float = 1.0) -> None:
-        """Count one. A negative amount takes it back."""
+    def spend(self, amount: float) -> None:
+        """Count without asking. A negative amount takes back."""
         self._used += amount
 
     def take(self, now: float) -> bool:

@@ -21,6 +21,8 @@ _EXPIRY_S = 60.0
 _UNPROVEN_S = 5.0
 #: Stations with a copy of the telemetry.
 MAX_STATIONS = 32
+#: A station that is silent for this long, three heartbeats, makes room for a newcomer without proven rights.
+_ROOM_S = 3.0
 #: A connected station, whether or not it transfers a mission, is never silent for this long.
 _STILL_S = 1.0
 #: The interval between searches for silent stations.
@@ -182,8 +184,7 @@ class Ground:
                 self._on_newcomer(station, now)
             return sender
         is_proven = path is None or station.has_key or path.is_proven_by(frame)
-        if is_proven and (station.has_key or station.allows(Cost.ARRIVAL, now)):
-            self._joins(sender, now)
+        if is_proven and (station.has_key or station.allows(Cost.ARRIVAL, now)) and self._joins(sender, now):
             return sender
         if peer not in self._unheard:
             self._unproven[peer] = station
@@ -193,10 +194,13 @@ class Ground:
         self._ask(station, path)
         return sender if path.is_near else None
 
-    def _joins(self, sender: Sender, now: float) -> None:
+    def _joins(self, sender: Sender, now: float) -> bool:
         station = sender.station
         if len(self._heard) >= MAX_STATIONS:
-            self._leaves(min(self._heard.values(), key=lambda each: (each.standing is Standing.PROVEN, each.heard_at)))
+            first = min(self._heard.values(), key=lambda each: (each.standing is Standing.PROVEN, each.heard_at))
+            if station.standing is not Standing.PROVEN and now < first.heard_at + _ROOM_S:
+                return False
+            self._leaves(first)
         for stations in (self._unheard, self._unproven):
             stations.pop(station.peer, None)
         station.return_path = None
@@ -207,6 +211,7 @@ class Ground:
         self._emit(GcsFound(station=str(sender)))
         for notice in self.notices:
             sender.say(notice)
+        return True
 
     def _ask(self, station: GroundStation, path: ReturnPath) -> None:
         """Reply to a datagram with the vehicle's heartbeat and a question that only its address gets."""

@@ -89,10 +89,10 @@ class Program:
 
     def take(self, data: bytes, now: float) -> bool:
         """Queue the requests in `data`. Returns False if all were dropped because of a flood."""
-        if not self._budget.has(now):
+        if not self._budget.take(now):
             return False
         requests = [frame for frame in self._parser.feed(data[-_READ_SIZE:]) if frame.direction is Direction.REQUEST]
-        self._budget.spend(len(requests))
+        self._budget.spend(len(requests) - 1)  # one is counted
         accepted = requests[: _MAX_WAITING - len(self.waiting)]
         self.waiting += [WaitingRequest(frame, now + _WAIT_S) for frame in accepted]
         return True

@@ -194,6 +194,28 @@ def test_local_strangers_do_not_displace_a_station_with_heartbeats() -> None:
     assert late.messages("HEARTBEAT", "ATTITUDE")
 
 
+def test_more_talkers_than_places_do_not_displace_a_station_with_heartbeats() -> None:
+    """Fifty machines, each heard 50 times a second and thus later than the pilot."""
+    world = ready_world()
+    pilot = GroundStation(world, ("192.168.4.2", 14550))
+    stranger = GroundStation(world, "stranger", sysid=9).pack(pilot.heartbeat)
+
+    def talk() -> None:
+        for number in range(50):
+            peer = Peer("udp", (f"192.168.4.{10 + number}", 14550))
+            world.bridge.gcs_received(peer, stranger, world.now, datagram=True)
+
+    for second in range(20):
+        world.after(second, partial(pilot.send, pilot.heartbeat))
+    world.run(2)
+    for turn in range(900):
+        world.after(turn / 50, talk)
+    for _ in range(17):
+        world.run(1)
+        assert pilot.peer in world.inside.ground.peers()
+    assert len(world.inside.ground.peers()) == 32
+
+
 def test_thirty_stations_that_request_everything_share_1200_messages_a_second() -> None:
     world = ready_world()
     stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
