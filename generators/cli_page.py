@@ -13,7 +13,7 @@ _WIDTH = 100
 _HEAD = """\
 # The command line
 
-`naze-bridge COMMAND --help`, or `man naze-bridge`, has the details and the options.
+`naze-bridge COMMAND --help`, or `man naze-bridge`, has the options, and when the exit code is 1.
 
 """
 
@@ -48,9 +48,10 @@ def _is_group(context: click.Context) -> bool:
 
 
 def _line(name: str, context: click.Context) -> str:
-    """The command with its arguments, the first paragraph of its help, and the sentences about exit codes."""
+    """The command with arguments, the first paragraph of the help, and the sentences about other exit codes than 1."""
     first, *others = re.split(r"\n\s*\n", (context.command.help or "").replace("\b", ""))
-    exits = re.findall(r"Exit codes?\b.*?\.(?=\s|$)", " ".join(others), re.DOTALL)
+    sentences = re.findall(r"Exit codes?\b.*?\.(?=\s|$)", " ".join(others), re.DOTALL)
+    exits = [each for each in sentences if re.search(r"\b[023]\b", each)]
     arguments = context.command.collect_usage_pieces(context)[1:]  # the first is [OPTIONS]
     short = name.removeprefix("naze-bridge ")
     return f"- `{' '.join([short, *arguments])}`: {' '.join(' '.join([first, *exits]).split())}\n"

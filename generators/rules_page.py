@@ -63,7 +63,6 @@ FLIGHTS = {
     "INAV: landing of an aeroplane by an FW approach": "source: navigation/navigation.c:1848, fwAutolandApproachConfig",
     "INAV: aeroplane, rover and boat": "source: the lines in the second table of docs/inav.md",
 }
-_BOTH_WAYS = "flown with lists that keep the rule and lists that break it"
 _ONE_WAY = "flown only as the rule says"
 _NOT_FLOWN = "not flown, from INAV's source"
 #: Rules without flights of the opposite: these say how an item is flown, or that a board needs nothing.
@@ -78,11 +77,11 @@ _AS_SHOWN = (
 
 
 def flights() -> str:
-    """The rules about the flight, by how they were flown."""
+    """The rules about the flight that were not flown both ways."""
     by_ways: dict[str, list[str]] = {}
     for rule, by in FLIGHTS.items():
-        ways = _NOT_FLOWN if "::" not in by else _ONE_WAY if rule in _AS_SHOWN else _BOTH_WAYS
-        by_ways.setdefault(ways, []).append(f"  - {rule}\n")
+        if "::" not in by or rule in _AS_SHOWN:
+            by_ways.setdefault(_ONE_WAY if "::" in by else _NOT_FLOWN, []).append(f"  - {rule}\n")
     return "".join(f"- {ways}:\n{''.join(rules)}" for ways, rules in by_ways.items())
 
 
