@@ -15,8 +15,8 @@ class Standing(Enum):
     """The rights that a ground station has proven."""
 
     LISTENER = "may only read"
-    OPEN = "its link requires nothing"
-    PROVEN = "has the key or the address that its link requires"
+    OPEN = "its link is open"
+    PROVEN = "has the key or address that its link requires"
 
 
 class Rights(NamedTuple):

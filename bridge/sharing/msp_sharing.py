@@ -216,7 +216,7 @@ class MspSharing:
         """The reason why requests cannot be forwarded now, or empty if it can."""
         state = self._session.state
         if state.link is None or state.controller is None:
-            return "no flight controller speaks MSP now"
+            return "the flight controller does not speak MSP now"
         armed = self._session.vehicle.armed
         if armed is not False:
             return _ARMED if armed else "not yet known to be disarmed"

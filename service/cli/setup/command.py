@@ -104,7 +104,7 @@ def setup(
         if page is None:
             page = click.confirm("Serve the status page to browsers on the network?", default=True)
         if key is None and not new_key and not current_key(host):
-            new_key = click.confirm("Make a key, without which nobody on the network can change missions or settings?")
+            new_key = click.confirm("Require a key to change missions or settings, and make one?")
     if hotspot is not None and password is None:
         if yes or dry_run:
             raise click.UsageError(Fault.NO_PASSWORD.text())
