@@ -159,7 +159,7 @@ def test_a_plan_is_recognised_by_the_contents() -> None:
         (plan(home="here"), ["plannedHomePosition", "'here'"]),
         (plan(home=[1, "2", 3]), ["plannedHomePosition", "'2'"]),
         (plan(home=[1, 2, 3, 4]), ["plannedHomePosition"]),
-        ({"version": "1.0", "items": []}, ["of version '1.0'", "open it in QGroundControl and save it as .plan"]),
+        ({"version": "1.0", "items": []}, ["version '1.0'", "open it in QGroundControl and save it as .plan"]),
         (plan(simple()) | {"version": 2}, ["the plan has version 2", "only 1 can be read"]),
         (plan(simple(), version=3), ["its mission has version 3"]),
         (plan() | {"geoFence": {"polygons": [{"polygon": [[1, 2]]}]}}, ["contains a fence but not a mission"]),
