@@ -18,6 +18,12 @@ from tests.support.programs import TIMEOUT_S, happens, until
 PHONE = (390, 844)
 LAPTOP = (1280, 900)
 TASKS = ("fly", "mission", "check", "pi")
+_PLAIN = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars", "--disable-gpu")
+#: A renderer costs as much as the browser's start, and one is kept ready for each further page.
+_ONE_RENDERER = (
+    *("--process-per-site", "--disable-site-isolation-trials", "--renderer-process-limit=1"),
+    "--disable-features=SpareRendererForSitePerProcess,BackForwardCache",
+)
 _WATCH_CLICK = """
     const wanted = document.querySelector(arguments[0]);
     window.missed = true;
@@ -125,12 +131,10 @@ class Browsers:
 
     @contextmanager
     def tab(self, port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) -> Iterator[Browser]:
-        """A new tab of `size` pixels for the page at `port`."""
+        """A browser's only tab, with `size` pixels, for the page at `port`."""
         if dark not in self._drivers:
             self._drivers[dark] = _start(dark=dark)
         driver = self._drivers[dark]
-        before = driver.current_window_handle
-        driver.switch_to.new_window("tab")
         width, height = size
         # The window has a minimum width, and a phone is narrower.
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
@@ -142,8 +146,7 @@ class Browsers:
             yield page
         finally:
             driver.execute_cdp_cmd("Storage.clearDataForOrigin", {"origin": page.url, "storageTypes": "all"})
-            driver.close()
-            driver.switch_to.window(before)
+            driver.get("about:blank")
 
     def close(self) -> None:
         for driver in self._drivers.values():
@@ -156,7 +159,7 @@ def _start(*, dark: bool) -> Chrome:
         pytest.skip("no browser here: apt-get install chromium chromium-driver")
     options = ChromeOptions()
     options.binary_location = str(programs["chromium"])
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--hide-scrollbars", "--disable-gpu"):
+    for argument in (*_PLAIN, *_ONE_RENDERER):
         options.add_argument(argument)
     if dark:
         options.add_argument("--blink-settings=preferredColorScheme=0")
