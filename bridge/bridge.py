@@ -5,7 +5,7 @@ The service feeds in bytes, time and the store's answers, and then takes the eff
 The path of a byte from the UART:
     fc_received -> FcSession -> MspLink -> Vehicle -> OwnVehicle -> Ground -> take
 The path of a mission item to the flight controller, and back for verification:
-    gcs_received -> Incoming -> GroundStation -> MissionUploads -> ListCheck
+    gcs_received -> Incoming -> Ground, GroundStation -> MissionUploads -> ListCheck
         -> MissionService.deliver -> FcMissionStore.push -> MspLink
 An autopilot that speaks MAVLink itself is not represented but passed through, both ways:
     FcSession <-> Routes <-> Ground
