@@ -48,7 +48,7 @@ def status_lines(facts: Json, addresses: list[str], host: Host) -> Iterator[tupl
             text = "{} deg off at this place: naze-bridge settings set {} {} && naze-bridge settings save"
             yield "Compass", text.format(*wrong)
         if facts["round_trip_ms"] is not None:
-            lost = f"{facts['requests_lost']} requests lost, {facts['bad_checksums']} bad checksums"
+            lost = f"lost requests: {facts['requests_lost']}, bad checksums: {facts['bad_checksums']}"
             yield "Serial line", f"round trip {facts['round_trip_ms']} ms, {lost}"
     yield "Ground stations", ", ".join(facts["ground_stations"]) or "none"
     for link in facts["links"]:
