@@ -98,7 +98,7 @@ def multiwii_profile(capacity: int = MULTIWII_CAPACITY) -> NavProfile:
         rth_height=True,
         jumps_back_only=True,
         # It counts milliseconds in 16 bits.
-        longest_hold=Range(0, 65, "a hold lasts 65 s at most"),
+        longest_hold=Range(0, 65, "at most 65 s"),
         ends_on_any_record=False,
         own_rth_landing=True,
     )

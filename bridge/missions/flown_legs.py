@@ -66,7 +66,7 @@ class Departure:
 
     def carried(self) -> Judgement:
         """Only from there is the list flown."""
-        return Judgement(None, "", f"flown only from the list's home, {in_metres(self.carried_m)} away", News.WARNING)
+        return Judgement(None, "", f"flown only from the list's home, {in_metres(self.carried_m)} off", News.WARNING)
 
 
 class Leg(NamedTuple):

@@ -76,12 +76,12 @@ class FlightLimits:
         for leg in path.legs:
             off_m = 0.0 if home is None else distance_m(home, leg.end)
             if 0 < self.mission_radius < int(off_m):
-                why = f"{NOT_FLOWN}: {in_metres(off_m)} away, mission_radius {self.mission_radius} m"
+                why = f"{NOT_FLOWN}: {in_metres(off_m)} off, mission_radius {self.mission_radius} m"
                 outside.append((leg.target, why))
             elif leg.is_first and int(leg.length_m) > self.mission_first:
-                why = f"{NOT_FLOWN}: {in_metres(leg.length_m)} away, mission_first {self.mission_first} m"
+                why = f"{NOT_FLOWN}: {in_metres(leg.length_m)} off, mission_first {self.mission_first} m"
                 if home and departure.home and int(distance_m(departure.home, leg.end)) <= self.mission_first:
-                    why = f"starts only at the list's home, {in_metres(distance_m(home, departure.home))} away"
+                    why = f"starts only at the list's home, {in_metres(distance_m(home, departure.home))} off"
                 yield Judgement(leg.target, "lat_e7", why)
             elif int(leg.length_m) > MAX_LEG_M:
                 long.append((leg.target, f"{NOT_FLOWN}: {in_metres(leg.length_m)} leg, at most 2 km"))
@@ -325,7 +325,7 @@ class HarakiriCheck(ListCheck):
         commands = [kept for kept in self._kept[1:] if kept[1].record is not WpCommand.SETROI]
         if len(commands) == 1 and not commands[0][1].alone:
             item, rule = commands[0]
-            return reject(MissionResult.INVALID, item, "command", f"{rule.name} cannot be the only item")
+            return reject(MissionResult.INVALID, item, "command", f"{rule.name} cannot be alone")
         return self._apply(self._flown(), [item for item, _ in self._kept])
 
     def _flown(self) -> Iterator[Judgement]:

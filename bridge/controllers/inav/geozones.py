@@ -187,7 +187,7 @@ class FenceCheck(ListCheck):
 
     def _take_corner(self, item: MissionItem, corner: Corner) -> RejectingFinding | None:
         if not (isfinite(item.p1) and item.p1 >= _LEAST_CORNERS):
-            return reject(MissionResult.INVALID_PARAM1, item, "p1", "a polygon needs three corners or more")
+            return reject(MissionResult.INVALID_PARAM1, item, "p1", "a polygon needs three corners")
         self._first = first = self._first or item
         if corner in self._corners:
             return reject(MissionResult.INVALID, item, "lat_e7", "duplicate corner: remove it")

@@ -190,7 +190,7 @@ class InavLimits:
             return
         if departure.home is not None and distance_m(departure.home, first) <= limit_m:
             off = in_metres(distance_m(departure.place, departure.home))
-            yield Judgement(0, "lat_e7", f"arms only near the list's home, {off} away")
+            yield Judgement(0, "lat_e7", f"arms only near the list's home, {off} off")
             return
         limit = f"nav_wp_max_safe_distance is {limit_m} m"
         yield Judgement(0, "lat_e7", f"{in_metres(metres)} from {departure.name}, {limit}: INAV would not arm", None)

@@ -302,7 +302,7 @@ class NavCheck(ListCheck):
             self._note(item, "alt_m", item.alt_m, alt_cm / 100, "whole cm, at most 32767 m")
         if rule.height is AltitudeUse.RTH:
             if alt_cm < 0:
-                self._note(item, "alt_m", item.alt_m, 0, "0 = the board's RTH altitude", News.WARNING)
+                self._note(item, "alt_m", item.alt_m, 0, "0 = the board's setting", News.WARNING)
             return max(alt_cm, 0), 0
         above_sea = item.frame in SEA_LEVEL_FRAMES
         counts_from_sea = above_sea and self._profile.sea_level

@@ -131,7 +131,7 @@ class Jumps:
     def _fault(self, place: int, wanted: int, records: list[NavRecord]) -> str | None:
         target = self.places[wanted]
         if target >= len(records):
-            return f"all items from {wanted} on are dropped"
+            return f"items from {wanted} on are dropped"
         if records[target].action not in LEGS:
             return f"item {wanted} is not a waypoint"
         if self.back_only:

@@ -166,7 +166,7 @@ def test_a_list_without_home_keeps_the_first_item_if_home_is_given(tmp_path: Pat
 
 
 def test_a_person_sees_why_a_list_is_rejected_or_cleared(files: dict[str, Path]) -> None:
-    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be the only" in run(files["rejected"]).stdout
+    assert "REJECTED: MAV_MISSION_INVALID, Rejected, WP 1: LAND cannot be alone" in run(files["rejected"]).stdout
     assert "CLEARED: MAV_MISSION_ACCEPTED, Mission erased" in run(files["cleared"]).stdout
 
 

@@ -47,21 +47,21 @@ def warnings(
 SWAPPED = replace(north(1), lat_e7=LON, lon_e7=LAT)
 CASES = [
     ((north(1.9), north(3)), None, []),
-    ((north(2.5),), None, ["WP 1: not flown: 250 m away, mission_first 200 m"]),
+    ((north(2.5),), None, ["WP 1: not flown: 250 m off, mission_first 200 m"]),
     ((north(1), north(30), north(60)), None, ["WP 2: not flown: 2.9 km leg, at most 2 km (+1)"]),
     ((north(1), north(20.9)), None, []),
     ((north(1), north(21.1)), None, ["WP 2: not flown: 2.0 km leg, at most 2 km"]),
     ((north(1), SWAPPED), None, ["WP 2: not flown: 5,779 km leg, at most 2 km"]),
     ((north(1, alt_m=101.0), north(2, alt_m=120.0)), None, ["WP 1: not flown: 101 m, mission_height 100 (+1)"]),
     ((north(1, alt_m=100.0), north(2, alt_m=-100.0)), None, ["WP 2: -100 m is flown at 2 m"]),
-    ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m away, mission_first 200 m"]),
+    ((item(TAKEOFF), north(2.5)), None, ["WP 2: not flown: 250 m off, mission_first 200 m"]),
     ((north(1), north(20), north(39), item(RTL)), None, ["WP 4: not flown: 3.9 km leg, at most 2 km"]),
     ((north(1), item(RTL, alt_m=120.0)), None, ["WP 2: not flown: 120 m, mission_height 100"]),
-    ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 500 m away"]),
+    ((north(1),), (LAT + 5 * NORTH, LON), ["WP 1: starts only at the list's home, 500 m off"]),
     ((north(6),), (LAT + 5 * NORTH, LON), []),
     # On a desk, 30 km away.
-    ((north(1), item(RTL)), (LAT + 300 * NORTH, LON), ["flown only from the list's home, 30.0 km away"]),
-    ((north(1), item(RTL)), (LAT, LON + 300 * EAST), ["flown only from the list's home, 30.0 km away"]),
+    ((north(1), item(RTL)), (LAT + 300 * NORTH, LON), ["flown only from the list's home, 30.0 km off"]),
+    ((north(1), item(RTL)), (LAT, LON + 300 * EAST), ["flown only from the list's home, 30.0 km off"]),
 ]
 
 
@@ -120,7 +120,7 @@ def test_the_settings_of_the_board_count() -> None:
         "WP 1: not flown: 60 m, mission_height 50"
     ]
     assert warnings(north(1), north(2), limits=FlightLimits(mission_radius=150)) == [
-        "WP 2: not flown: 200 m away, mission_radius 150 m"
+        "WP 2: not flown: 200 m off, mission_radius 150 m"
     ]
 
 

@@ -46,7 +46,7 @@ def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None
 def test_the_first_waypoint_is_measured_from_the_craft() -> None:
     """INAV's home is where it is armed, whatever the home of the list."""
     assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == []
-    warning = "WP 1: arms only near the list's home, 250 m away"
+    warning = "WP 1: arms only near the list's home, 250 m off"
     assert texts(NEAR, here=(LAT + NORTH * 5 // 2, LON)) == [warning]
 
 
