@@ -57,51 +57,30 @@ def test_with_the_patch_a_run_within_a_frame_is_only_counted(run: bytes) -> None
     assert bench.naze.counters.hazard_runs == 1
 
 
-@pytest.mark.parametrize("data", [b"\r\rx\r\r", b"\r\r$\r"])
-def test_a_byte_between_the_returns_resets_the_count(data: bytes) -> None:
-    bench = Bench()
-    bench.send(data)
-    bench.run(0.1)
-    assert not bench.naze.counters.cli_entered
-    assert bench.naze.counters.hazard_runs == 0
-
-
-def test_returns_are_harmless_while_armed() -> None:
-    bench = Bench(faults=Faults(armed=True))
+@pytest.mark.parametrize(
+    ("sent", "armed", "runs"), [(b"\r\rx\r\r", False, 0), (b"\r\r$\r", False, 0), (b"\r\r\r\r", True, 1)]
+)
+def test_returns_are_harmless_while_armed_and_with_a_byte_between_them(sent: bytes, armed: bool, runs: int) -> None:
+    bench = Bench(faults=Faults(armed=armed))
     bench.run(0.01)
-    bench.send(b"\r\r\r\r")
+    bench.send(sent)
     bench.run(0.1)
     assert not bench.naze.counters.cli_entered
-    assert bench.naze.counters.hazard_runs == 1
-    assert speaks_msp(bench)
+    assert bench.naze.counters.hazard_runs == runs
 
 
-def test_number_signs_enter_the_cli_in_autosense_only() -> None:
+@pytest.mark.parametrize(("run", "power"), [(b"###", Power.CLI), (b"RRR", Power.BOOTLOADER)])
+def test_number_signs_and_letters_r_act_in_autosense_only(run: bytes, power: Power) -> None:
     quiet = Bench()
     assert speaks_msp(quiet)
-    quiet.send(b"###" * 4)
+    quiet.send(run * 4)
     quiet.run(0.1)
-    assert not quiet.naze.counters.cli_entered
+    assert quiet.naze.power is Power.RUNNING
     assert quiet.naze.counters.hazard_runs == 1
-
     bench = Bench()
-    bench.send(b"###")
-    bench.run(0.1)
-    assert bench.naze.counters.cli_entered
-
-
-def test_letters_r_start_the_boot_loader_in_autosense_only() -> None:
-    quiet = Bench()
-    assert speaks_msp(quiet)
-    quiet.send(b"RRR")
-    quiet.run(0.1)
-    assert quiet.naze.counters.resets == 0
-
-    bench = Bench()
-    bench.send(b"RRR")
+    bench.send(run)
     bench.run(0.01)
-    assert bench.naze.counters.resets == 1
-    assert bench.naze.power is Power.BOOTLOADER
+    assert bench.naze.power is power
 
 
 def test_a_reset_is_silent_for_two_seconds_and_loses_the_ram() -> None:
@@ -145,19 +124,6 @@ def test_the_autosense_counters_are_kept_outside_of_it() -> None:
     assert bench.naze.counters.cli_entered
 
 
-def test_a_run_begun_in_autosense_can_complete_four_seconds_later() -> None:
-    """The byte that completes the frame switches to MSP; a count it began is kept until AUTOSENSE returns."""
-    ends_in_sign = request(108, bytes((0x23 ^ 1 ^ 108,)))
-    assert ends_in_sign[-1] == 0x23
-    bench = stock()
-    assert bench.ask(ends_in_sign) is not None
-    bench.send(b"irrelevant")
-    bench.run(4.5)
-    bench.send(b"##")
-    bench.run(0.1)
-    assert bench.naze.counters.cli_entered
-
-
 def test_signs_act_on_an_armed_craft_that_never_left_autosense() -> None:
     """With tele_prot 1 arming does not select a protocol."""
     options = SimOptions(tele_prot=TelemetryProtocol.FRSKY_9600)
@@ -195,12 +161,9 @@ def typed(bench: Bench, line: bytes, seconds: float = 0.3) -> bytes:
     return bench.run(seconds)
 
 
-def test_the_clis_status_counts_the_records() -> None:
-    assert b"5 Datasets of 146 possible" in typed(in_cli(5), b"status")
-
-
-def test_wpflush_counts_after_save() -> None:
+def test_the_cli_counts_the_records_and_wpflush_counts_after_save() -> None:
     bench = in_cli(5)
+    assert b"5 Datasets of 146 possible" in typed(bench, b"status")
     assert b"0 Datasets" in typed(bench, b"wpflush")
     assert len(bench.naze.stored_records) == 5
     assert b"Rebooting" in typed(bench, b"save", 2.0)

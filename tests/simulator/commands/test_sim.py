@@ -1,182 +1,228 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --kind`: other flight controllers on a pseudo-terminal and on a socket, as processes."""
+"""`naze-bridge sim` as a process: flight controllers on a pseudo-terminal and on a socket."""
 
-import json
+import os
 import signal
 import socket
-import subprocess
+import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 import serial
+from click.testing import CliRunner
 
-from protocols.msp.frame import request
+from protocols.msp.frame import MspFrame, MspParser, request
 from protocols.msp.nav import NavAction
-from simulator.board.nav_waypoint import FLAG_LAST
-from tests.support.msp_bench import Frame, split_frames, waypoint
-from tests.support.programs import NAZE_BRIDGE, REPOSITORY, TIMEOUT_S, control, free_port, run_naze_bridge, until
+from simulator.commands.sim import sim
+from tests.support.msp_bench import waypoint
+from tests.support.programs import TIMEOUT_S, Board, run_naze_bridge, until
 
-
-class Simulator:
-    """A simulator process, on a socket at `port` unless it has a link."""
-
-    def __init__(self, directory: Path, *options: str, link: Path | None = None) -> None:
-        self.port = free_port(socket.SOCK_STREAM)
-        self._control = directory / "control"
-        place = ("--link", str(link)) if link else ("--tcp", f"127.0.0.1:{self.port}")
-        arguments = ["sim", *place, "--control", str(self._control), *options]
-        self.process = subprocess.Popen([*NAZE_BRIDGE, *arguments], cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout
-        self.greeting = self.process.stdout.readline()
-
-    def line(self, line: str) -> str:
-        return control(self._control, line)
-
-    def client(self) -> "Client":
-        return Client(self.port)
-
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(TIMEOUT_S)
-
-
-class Client:
-    """A TCP client that sends one request at a time."""
-
-    def __init__(self, port: int) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), TIMEOUT_S)
-
-    def __enter__(self) -> "Client":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.socket.close()
-
-    def ask(self, command: int, payload: bytes = b"", timeout: float = TIMEOUT_S) -> Frame | None:
-        """The reply; None after the timeout, ConnectionError if disconnected."""
-        self.socket.sendall(request(command, payload))
-        self.socket.settimeout(timeout)
-        received = b""
-        while not (frames := split_frames(received)):
-            try:
-                data = self.socket.recv(4096)
-            except TimeoutError:
-                return None
-            if not data:
-                raise ConnectionError
-            received += data
-        return frames[0]
-
-    def payload(self, command: int, payload: bytes = b"") -> bytes:
-        frame = self.ask(command, payload)
-        assert frame is not None
-        assert frame.direction == ">"
-        return frame.payload
+IDENT, VERSION, NAME, GETINFO = (request(command) for command in (100, 3, 2, 20))
+#: After this much silence no answer is expected.
+SILENCE_S = 1.0
+Start = Callable[..., Board]
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Simulator]]:
-    started: list[Simulator] = []
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Starts simulators, each with a folder of its own."""
+    with ExitStack() as stack:
 
-    def make(*options: str, link: Path | None = None) -> Simulator:
-        started.append(Simulator(tmp_path, *options, link=link))
-        return started[-1]
+        def started(*options: str, tcp: bool = False) -> Board:
+            folder = tmp_path / f"simulator {len(list(tmp_path.iterdir()))}"
+            folder.mkdir()
+            board = Board(folder, *options, tcp=tcp)
+            stack.callback(board.end, signal.SIGKILL)
+            board.wait()
+            return board
 
-    yield make
-    for simulator in started:
-        simulator.process.kill()
-        # Also closes its output.
-        simulator.process.communicate()
-
-
-def test_an_inav_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
-    simulator = start("--kind", "inav", "--inav-version", "8.0.1")
-    assert simulator.greeting == f"Simulated INAV 8.0.1 at 127.0.0.1:{simulator.port}. Ctrl-C ends it.\n"
-    with simulator.client() as client:
-        assert client.payload(3) == bytes((8, 0, 1))
-    assert simulator.end() == 0
+        yield started
 
 
-def test_a_multiwii_runs_on_a_pseudo_terminal(start: Callable[..., Simulator], tmp_path: Path) -> None:
-    simulator = start("--kind", "multiwii", "--baud", "57600", link=tmp_path / "tty")
-    assert simulator.greeting == f"Simulated MultiWii at {tmp_path / 'tty'}, 57600 baud. Ctrl-C ends it.\n"
-    with serial.Serial(str(tmp_path / "tty"), 57600, timeout=TIMEOUT_S) as port:
-        port.write(request(100))
-        assert port.read(13)[:6] == bytes((*b"$M>", 7, 100, 241))
+def opened(link: Path, baud: int = 115200) -> serial.Serial:
+    return serial.Serial(str(link), baud, timeout=0.05, exclusive=True)
 
 
-def test_a_naze_runs_on_a_socket(start: Callable[..., Simulator]) -> None:
-    with start().client() as client:
-        assert client.payload(100)[0] == 211
+def connected(board: Board) -> socket.socket:
+    host, _, port = board.fc.removeprefix("tcp:").partition(":")
+    return socket.create_connection((host, int(port)), TIMEOUT_S)
 
 
-def test_a_second_client_waits_for_the_turn(start: Callable[..., Simulator]) -> None:
-    simulator = start("--kind", "inav")
-    with simulator.client() as first, simulator.client() as second:
-        assert first.payload(2) == b"INAV"
-        assert second.ask(2, timeout=0.3) is None
-        first.socket.close()
+def ask(port: serial.Serial | socket.socket, frame: bytes, seconds: float = TIMEOUT_S) -> MspFrame | None:
+    """Ask once; None after this many seconds of real time, ConnectionError if disconnected."""
+    parser, deadline = MspParser(), time.monotonic() + seconds
+    if isinstance(port, socket.socket):
+        port.settimeout(0.05)
+        port.sendall(frame)
+    else:
+        port.write(frame)
+    while time.monotonic() < deadline:
+        if frames := parser.feed(port.read(4096) if isinstance(port, serial.Serial) else received(port)):
+            return frames[0]
+    return None
+
+
+def received(client: socket.socket) -> bytes:
+    try:
+        data = client.recv(4096)
+    except TimeoutError:
+        return b""
+    if not data:
+        raise ConnectionError
+    return data
+
+
+def test_the_port_answers_at_the_boards_speed_only(start: Start) -> None:
+    board = start("--kind", "multiwii", "--baud", "57600")
+    assert board.printed == f"Simulated MultiWii at {board.link}, 57600 baud. Ctrl-C ends it.\n"
+    with opened(board.link, 57600) as port:
+        answer = ask(port, IDENT)
+        assert answer is not None
+        assert answer.payload[0] == 241
+        port.baudrate = 115200
+        assert ask(port, IDENT, SILENCE_S) is None
+        port.baudrate = 57600
+    naze = start("--baud", "57600")
+    with opened(naze.link) as port:
+        assert ask(port, IDENT, SILENCE_S) is None
+        port.baudrate = 57600
+        # Bytes received at the wrong speed may have begun a frame; the receiver drops it after a while.
+        until(lambda: ask(port, IDENT, SILENCE_S), "an answer")
+
+
+def test_the_speed_changes_with_arming(start: Start) -> None:
+    board = start("--tele-prot", "3")
+    with opened(board.link) as port:
+        assert ask(port, IDENT) is not None
+        board.set("armed 1")
+        until(lambda: board.stats()["baud"] == 57600, "the speed of an armed board")
+        port.baudrate = 57600
+        port.reset_input_buffer()
+        until(lambda: b"\xfe\x1c" in port.read(200), "an attitude")
+
+
+def test_a_bad_control_line_is_an_error(start: Start) -> None:
+    board = start()
+    assert board.line("bit_error_rate much") == "error: bit_error_rate takes a number, not 'much'"
+    assert board.line("boxes inf") == "error: boxes takes a number, not 'inf'"
+    assert board.line("sing") == "error: unknown line 'sing'"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_cleanly(start: Start, number: signal.Signals) -> None:
+    board = start()
+    assert board.end(number) == 0
+    assert [file.name for file in board.link.parent.iterdir()] == ["board.log"]
+
+
+def test_a_second_client_waits_for_the_turn(start: Start) -> None:
+    board = start("--kind", "inav", "--inav-version", "8.0.1", tcp=True)
+    assert board.printed == f"Simulated INAV 8.0.1 at {board.fc.removeprefix('tcp:')}. Ctrl-C ends it.\n"
+    with connected(board) as first, connected(board) as second:
+        answer = ask(first, VERSION)
+        assert answer is not None
+        assert answer.payload == bytes((8, 0, 1))
+        assert ask(second, NAME, 0.3) is None
+        first.close()
         # Now the first request is answered.
-        assert second.payload(3) == b"INAV"
+        answer = ask(second, VERSION)
+        assert answer is not None
+        assert answer.payload == b"INAV"
 
 
-def test_after_a_crash_the_port_is_gone_until_a_power_cycle(start: Callable[..., Simulator]) -> None:
-    simulator = start("--kind", "inav")
-    with simulator.client() as client:
-        client.payload(209, waypoint(1).pack(1))
-        client.payload(209, waypoint(action=NavAction.JUMP, p1=0).pack(2))
+def test_after_a_crash_the_port_is_gone_until_a_power_cycle(start: Start) -> None:
+    board = start("--kind", "inav", tcp=True)
+    with connected(board) as client:
+        ask(client, request(209, waypoint(1).pack(1)))
+        ask(client, request(209, waypoint(action=NavAction.JUMP, p1=0).pack(2)))
         with pytest.raises(ConnectionError):
-            client.ask(20)
+            ask(client, GETINFO)
     with pytest.raises(ConnectionRefusedError):
-        simulator.client()
-    assert json.loads(simulator.line("stats"))["power"] == "CRASHED"
-    assert [simulator.line("power off"), simulator.line("power on")] == ["ok", "ok"]
+        connected(board)
+    assert board.stats()["power"] == "CRASHED"
+    board.set("power off")
+    board.set("power on")
     # During boot nothing is received.
-    with simulator.client() as client:
-        assert until(lambda: client.ask(20, timeout=0.5), "an answer") == (">", 20, bytes((0, 120, 0, 0)))
-
-
-def test_the_eeprom_is_kept_in_a_file(start: Callable[..., Simulator], tmp_path: Path) -> None:
-    state = tmp_path / "eeprom"
-    simulator = start("--kind", "inav", "--state", str(state))
-    with simulator.client() as client:
-        client.payload(209, waypoint(1, flag=FLAG_LAST).pack(1))
-        client.payload(19, b"\0")
-    assert json.loads(simulator.line("stats"))["records"] == [waypoint(1, flag=FLAG_LAST).pack(1).hex()]
-    simulator.end()
-    with start("--kind", "inav", "--state", str(state)).client() as client:
-        client.payload(18, b"\0")
-        assert client.payload(20) == bytes((0, 120, 1, 1))
-
-
-def test_truth_reports_the_flight(start: Callable[..., Simulator]) -> None:
-    simulator = start("--kind", "inav")
-    assert simulator.line("armed 1") == "ok"
-    until(lambda: json.loads(simulator.line("truth"))["flight"]["height_m"] > 0.1, "the take-off")
-    assert json.loads(simulator.line("truth"))["armed"] is True
+    with connected(board) as client:
+        answer = until(lambda: ask(client, GETINFO, 0.5), "an answer")
+        assert answer.payload == bytes((0, 120, 0, 0))
 
 
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--kind", "inav"), "--link PATH or --tcp HOST:PORT"),
-        (("--tcp", "5760"), "'5760' is not HOST:PORT"),
-        (("--kind", "inav", "--tcp", "127.0.0.1:1", "--tele-prot", "1"), "--tele-prot has no effect with --kind inav"),
-        (("--tcp", "127.0.0.1:1", "--speed", "4"), "--speed has no effect with a board that does not fly"),
-        (("--kind", "inav", "--tcp", "192.0.2.1:5760"), "192.0.2.1:5760 cannot be opened for listening"),
-        (("--kind", "inav", "--tcp", "127.0.0.1:5760", "--state", "pyproject.toml"), "name another file"),
+        ("--link {}/none/naze", "Error: {}/none/naze cannot be created: No such file or directory\n"),
+        ("--link {}/file", "Error: {}/file already exists: use another --link, or remove it\n"),
+        ("--link {}/link", "Error: {}/link already exists: use another --link, or remove it\n"),
+        ("--link {}/naze --control {}/none/socket", "Error: {}/none/socket cannot be created: "),
+        ("--link {}/naze --state {}/none/flash", "Error: the state file {}/none/flash cannot be used: "),
+        ("--link {}/naze --state {}/file", "Error: the state file {}/file has 4 bytes, but this board's"),
+        ("--kind inav --tcp 127.0.0.1:5760 --state {}/file", "name another file"),
+        ("--kind inav", "--link PATH or --tcp HOST:PORT"),
+        ("--tcp 5760", "'5760' is not HOST:PORT"),
+        ("--kind inav --tcp 127.0.0.1:1 --tele-prot 1", "--tele-prot has no effect with --kind inav"),
+        ("--tcp 127.0.0.1:1 --speed 4", "--speed has no effect with a board that does not fly"),
+        ("--kind inav --tcp 192.0.2.1:5760", "192.0.2.1:5760 cannot be opened for listening"),
     ],
 )
-def test_an_invalid_option_is_reported_in_one_sentence(options: tuple[str, ...], says: str) -> None:
-    ended = run_naze_bridge("sim", *options)
-    assert ended.returncode != 0
-    assert says in ended.stderr
-    assert "Traceback" not in ended.stderr
+def test_obstacles_at_start_are_reported_in_one_sentence(tmp_path: Path, options: str, says: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "link").symlink_to("file")
+    done = CliRunner().invoke(sim, options.replace("{}", str(tmp_path)).split())
+    assert done.exit_code != 0
+    assert says.replace("{}", str(tmp_path)) in done.stderr
+    assert (tmp_path / "link").readlink() == Path("file")
+    assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_a_port_in_use_is_named_with_the_remedy(start: Callable[..., Simulator]) -> None:
-    first = start("--kind", "inav")
-    second = run_naze_bridge("sim", "--kind", "inav", "--tcp", f"127.0.0.1:{first.port}")
-    why = f"127.0.0.1:{first.port} cannot be opened for listening: Address already in use; give another port"
+def test_a_port_in_use_is_named_with_the_remedy(start: Start) -> None:
+    address = start("--kind", "inav", tcp=True).fc.removeprefix("tcp:")
+    second = run_naze_bridge("sim", "--kind", "inav", "--tcp", address)
+    why = f"{address} cannot be opened for listening: Address already in use; give another port"
     assert (second.returncode, second.stderr) == (1, f"naze-bridge: {why}\n")
+
+
+# -- the link to the pseudo-terminal -------------------------------------------------------------------------
+
+
+def test_the_link_of_a_killed_simulator_is_replaced(start: Start) -> None:
+    killed = start()
+    killed.end(signal.SIGKILL)
+    assert os.path.islink(killed.link)
+    start("--link", str(killed.link))
+    with opened(killed.link) as port:
+        assert ask(port, IDENT) is not None
+
+
+def test_a_link_older_than_the_terminal_behind_it_is_replaced(start: Start) -> None:
+    other = start()
+    stale = other.link.with_name("stale")
+    # The kernel gave the number of a killed simulator's terminal to this one.
+    stale.symlink_to(other.link.readlink())
+    os.utime(stale, (0, 0), follow_symlinks=False)
+    start("--link", str(stale))
+    with opened(stale) as port:
+        assert ask(port, IDENT) is not None
+    assert stale.readlink() != other.link.readlink()
+
+
+def test_a_link_taken_over_by_another_simulator_is_not_removed(start: Start) -> None:
+    first = start()
+    first.link.unlink()
+    start("--link", str(first.link))
+    terminal = first.link.readlink()
+    assert first.end() == 0
+    assert first.link.readlink() == terminal
+
+
+def test_the_link_of_a_running_simulator_is_not_replaced(start: Start) -> None:
+    link = start().link
+    with opened(link) as port:
+        # Checking the lock does not release it.
+        for _ in range(2):
+            second = run_naze_bridge("sim", "--link", link)
+            assert second.returncode == 1
+            assert f"{link} belongs to a running simulator" in second.stderr
+        assert ask(port, IDENT) is not None

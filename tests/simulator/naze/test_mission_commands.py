@@ -2,27 +2,23 @@
 """The flight controller's side of docs/msp-mission.md, through the UART."""
 
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.mission_item import ListIdentity, identify, pack_records
-from protocols.msp.frame import request
 from protocols.msp.mission import (
     ABORT_REQUEST,
     INFO_REQUEST,
     Info,
-    InfoFlag,
     ReplyStatus,
-    Stored,
     WpRecord,
     decode_info,
     encode_begin,
     encode_chunk,
     encode_commit,
 )
-from simulator.board.options import Faults, SimOptions
+from simulator.board.options import SimOptions
 from simulator.board.simulated_board import Power
-from simulator.naze.replies import decode_radius, encode_radius
+from simulator.naze.replies import encode_radius
 from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)
@@ -55,26 +51,6 @@ def in_use(options: SimOptions | None = None) -> Bench:
     return bench
 
 
-def test_without_the_extension_the_commands_are_unknown() -> None:
-    bench = Bench(faults=Faults(extension=False))
-    answer = bench.ask(INFO_REQUEST)
-    assert answer is not None
-    assert answer.payload == b""
-    assert decode_info(answer.payload) is None
-
-
-@settings(max_examples=40)
-@given(st.lists(records_of_any_kind, max_size=146))
-def test_a_pushed_list_reads_back_identical(records: list[WpRecord]) -> None:
-    bench = Bench()
-    if records:
-        assert bench.push(records) == Stored(ReplyStatus.OK, identify(records))
-    assert bench.pull() == records
-    assert bench.naze.stored == pack_records(records)
-    assert bench.naze.counters.hazard_runs == 0
-    assert info(bench).stored == identify(records)
-
-
 def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
     bench = in_use(SimOptions(flash_erase_ms=300))
     before = bench.now
@@ -89,15 +65,6 @@ def test_begin_stalls_for_the_erase_and_commit_does_not() -> None:
     bench.progress(encode_chunk(pack_records(mission(2)), 1, 1).frame)
     bench.stored(encode_commit(identify(mission(2))))
     assert bench.now - before < 0.030
-
-
-def test_input_during_the_erase_overflows_the_receive_ring() -> None:
-    bench = in_use(SimOptions(flash_erase_ms=100))
-    bench.send(encode_begin(identify(mission(2))))
-    bench.run(0.01)
-    bench.send(request(100) * 100)
-    bench.run(0.3)
-    assert bench.naze.counters.rx_overflows == 1
 
 
 def test_a_window_of_two_chunks_fills_the_line() -> None:
@@ -125,41 +92,6 @@ def test_a_chunk_with_too_many_records_is_a_bad_request() -> None:
         board.progress(encode_begin(identify(records)))
         answer = board.ask(encode_chunk(pack_records(records), 0, 10).frame, timeout=0.3)
         assert (answer and answer.payload[0]) == status
-
-
-def test_a_radius_is_written_in_the_next_loop_which_stalls() -> None:
-    bench = Bench()
-    radius = decode_radius(bench.payload(encode_radius(350)))
-    assert radius is not None
-    assert (radius.status, radius.wp_radius_cm) == (ReplyStatus.OK, 350)
-    begun = bench.now
-    assert not info(bench).flags
-    assert 0.15 < bench.now - begun < 0.25
-    bench.naze.power_off(bench.now)
-    bench.naze.power_on(bench.now)
-    bench.run(BOOT_SECONDS + 0.1)
-    assert info(bench).wp_radius_cm == 350
-
-
-def test_writing_a_radius_keeps_an_open_transfer() -> None:
-    bench = Bench()
-    bench.progress(encode_begin(identify(mission(3))))
-    bench.payload(encode_radius(350))
-    bench.run(0.5)
-    assert info(bench).flags == InfoFlag.TRANSFER_OPEN
-
-
-def test_a_radius_not_yet_written_is_lost_in_a_power_cut() -> None:
-    bench = Bench(SimOptions(config_write_delay_ms=1000))
-    bench.payload(encode_radius(350))
-    bench.run(0.9)
-    assert info(bench).flags == InfoFlag.WRITE_PENDING
-    assert bench.payload(encode_radius(360))[0] == ReplyStatus.BUSY
-    assert bench.progress(encode_begin(identify(mission(1)))).status is ReplyStatus.BUSY
-    bench.naze.power_off(bench.now)
-    bench.naze.power_on(bench.now)
-    bench.run(BOOT_SECONDS + 0.1)
-    assert info(bench).wp_radius_cm == 200
 
 
 @pytest.mark.parametrize("operation", range(1, 5))

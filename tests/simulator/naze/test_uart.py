@@ -32,14 +32,6 @@ def test_bytes_arrive_one_after_the_other_at_line_rate() -> None:
     assert drain(uart, 1.0 + 3.0 * BYTE) == b"bc"
 
 
-def test_later_bytes_follow_earlier_bytes_on_the_wire() -> None:
-    uart, _ = make(9600)
-    uart.receive(b"x" * 10, 0.0)
-    uart.receive(b"y", 0.001)
-    assert drain(uart, 10.5 * 10 / 9600) == b"x" * 10
-    assert drain(uart, 11 * 10 / 9600) == b"y"
-
-
 @given(count=st.integers(0, 1200), read_before=st.integers(0, 255))
 def test_an_unread_ring_holds_only_the_newest_bytes(count: int, read_before: int) -> None:
     """Compared with a ring with positions, as in drv_uart.c."""
@@ -65,25 +57,6 @@ def test_sent_bytes_leave_at_line_rate() -> None:
     assert uart.transmitted(201 * BYTE) == bytes((199,))
 
 
-@given(st.lists(st.tuples(st.binary(min_size=1, max_size=100), st.floats(0.0005, 0.03)), max_size=30))
-def test_loses_bytes_only_if_the_ring_overflows(writes: list[tuple[bytes, float]]) -> None:
-    uart, counters = make()
-    sent, now, outstanding = b"", 0.0, 0.0
-    received = b""
-    for data, pause in writes:
-        outstanding = max(outstanding - pause / BYTE, 0)
-        now += pause
-        if outstanding + len(data) > 255:
-            continue
-        outstanding += len(data)
-        uart.write(data, now)
-        sent += data
-        received += uart.transmitted(now)
-    assert received + uart.transmitted(now + 1) == sent
-    assert counters.tx_overflows == 0
-    assert counters.max_outstanding_reply_bytes <= 255
-
-
 def test_more_than_255_outstanding_bytes_corrupt_each_other() -> None:
     uart, counters = make()
     first, second = b"a" * 200, b"b" * 100
@@ -107,15 +80,6 @@ def test_the_end_of_a_burst_is_the_departure_time() -> None:
     assert uart.next_departure() is None
 
 
-def test_bursts_that_end_close_together_depart_together() -> None:
-    uart, _ = make()
-    for _ in range(3):
-        uart.write(b"q" * 12, 0.0)
-    departure = uart.next_departure()
-    assert departure is not None
-    assert uart.transmitted(departure) == b"q" * 36
-
-
 def test_changing_the_speed_clears_the_rings() -> None:
     uart, _ = make()
     uart.receive(b"r" * 20, 0.0)
@@ -128,17 +92,9 @@ def test_changing_the_speed_clears_the_rings() -> None:
     assert uart.transmitted(1.0 + 5.5 * 10 / 9600) == b"n" * 5
 
 
-def test_at_equal_speeds_bytes_are_unchanged() -> None:
-    assert garble(bytes(range(256)), 57600, 57600) == bytes(range(256))
-
-
 def test_half_the_speed_doubles_each_bit() -> None:
     # 'U' is 0 10101010 1 on the wire; a receiver at twice the speed starts with 0 01100110 and a low stop bit.
     assert garble(b"U", 9600, 19200)[0] == 0x66
-
-
-def test_a_disconnected_port_is_silent() -> None:
-    assert garble(b"hello", 0, 115200) == b""
 
 
 @given(
