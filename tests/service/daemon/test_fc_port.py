@@ -6,10 +6,11 @@ import os
 import socket
 import termios
 import tty
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import suppress
 from math import inf
 from pathlib import Path
+from unittest.mock import AsyncMock
 
 import pytest
 import serial
@@ -48,11 +49,11 @@ class Line:
         self.reads = 0
 
     def start(self) -> FcPort:
-        self.port = FcPort(
-            device_opener(SerialFc(str(self.path), None)), self._on_open, self._on_data, self.lost.append, Traffic()
-        )
-        self._task = asyncio.get_running_loop().create_task(self.port.run())
-        return self.port
+        opener = device_opener(SerialFc(str(self.path), None))
+        port = FcPort(opener, self._on_open, self._on_data, self.lost.append, Traffic())
+        port.may_gather = True
+        self._task = asyncio.get_running_loop().create_task(port.run())
+        return port
 
     async def stop(self) -> None:
         self._task.cancel()
@@ -119,10 +120,16 @@ def line(tmp_path: Path) -> Iterator[Line]:
     line.close()
 
 
-async def test_reads_are_batched_only_at_high_rates(line: Line) -> None:
+@pytest.fixture
+async def port(line: Line) -> AsyncIterator[FcPort]:
+    """An open port that may gather."""
     port = line.start()
     await until_async(lambda: line.opened, "the port")
-    port.may_gather = True
+    yield port
+    await line.stop()
+
+
+async def test_reads_are_batched_only_at_high_rates(line: Line, port: FcPort) -> None:
     sent = 0
     for _ in range(3):
         sent = await line.feed_until_gathered(sent)
@@ -136,13 +143,9 @@ async def test_reads_are_batched_only_at_high_rates(line: Line) -> None:
     assert line.numbers() == list(range(sent))
     assert line.lost == []
     assert line.opened == 1
-    await line.stop()
 
 
-async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
-    port.may_gather = True
+async def test_gathering_ends_when_a_reply_is_expected(line: Line, port: FcPort) -> None:
     sent = await line.feed_until_gathered()
     port.hold(asyncio.get_running_loop().time() + HOUR_S)
     port.write(b"a heartbeat")
@@ -150,7 +153,6 @@ async def test_gathering_ends_when_a_reply_is_expected(line: Line) -> None:
     assert len(line.numbers()) == sent - 1
     port.write(b"a request", asks=True)
     await line.has_come(sent)
-    await line.stop()
 
 
 class Gathering:
@@ -219,10 +221,8 @@ async def test_a_closed_port_is_not_held() -> None:
     assert line.lane.held_until == -inf
 
 
+@pytest.mark.usefixtures("port")
 async def test_a_port_that_disconnects_during_batched_reads_is_reopened(line: Line, tmp_path: Path) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
-    port.may_gather = True
     await line.feed_until_gathered()
     line.path.unlink()
     line.close()
@@ -233,37 +233,35 @@ async def test_a_port_that_disconnects_during_batched_reads_is_reopened(line: Li
     line.received.clear()
     await line.feed(7, 1, 50)
     await until_async(lambda: line.numbers() == [7], "a frame")
-    await line.stop()
 
 
-async def test_a_full_uart_drops_whole_frames(line: Line) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
-    sent = [attitude(number) for number in range(2000)]
-    for frame in sent:
-        port.write(frame)
+async def left_whole(line: Line, port: FcPort, sent: list[bytes], taken: bytearray) -> list[bytes]:
+    """The frames that were not dropped, read to the end."""
     assert port.dropped_bytes
-    taken = bytearray()
 
-    def take_whole() -> bool:
+    def take() -> bool:
         taken.extend(line.take())
         return len(taken) == sum(map(len, sent)) - port.dropped_bytes
 
-    await until_async(take_whole, "all that was not dropped")
+    await until_async(take, "all that was not dropped")
     frames = [frame.raw for frame in MavlinkSplitter().feed(bytes(taken))]
     assert b"".join(frames) == taken
+    return frames
+
+
+async def test_a_full_uart_drops_whole_frames(line: Line, port: FcPort) -> None:
+    sent = [attitude(number) for number in range(2000)]
+    for frame in sent:
+        port.write(frame)
+    frames = await left_whole(line, port, sent, bytearray())
     assert frames == sent[: len(frames)]
     # When it is read again, it gets the new frames.
     port.write(sent[-1])
-    taken.clear()
-    await until_async(lambda: take_whole() or bytes(taken) == sent[-1], "a frame")
-    await line.stop()
+    await until_async(lambda: line.take() == sent[-1], "a frame")
 
 
-async def test_a_stuck_uart_resumes_with_whole_frames(line: Line) -> None:
+async def test_a_stuck_uart_resumes_with_whole_frames(line: Line, port: FcPort) -> None:
     """The wire is read in small pieces, so that the terminal splits frames anywhere."""
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
     sent = [attitude(number) for number in range(4000)]
     taken = bytearray()
     for number, frame in enumerate(sent):
@@ -271,24 +269,12 @@ async def test_a_stuck_uart_resumes_with_whole_frames(line: Line) -> None:
         if number % 40 == 0:
             taken += line.take(701)
             await asyncio.sleep(0)
-
-    def take_whole() -> bool:
-        taken.extend(line.take())
-        return len(taken) == sum(map(len, sent)) - port.dropped_bytes
-
-    await until_async(take_whole, "all that was not dropped")
-    assert port.dropped_bytes
-    frames = [frame.raw for frame in MavlinkSplitter().feed(bytes(taken))]
-    assert b"".join(frames) == taken
-    numbers = [sent.index(frame) for frame in frames]
+    numbers = [sent.index(frame) for frame in await left_whole(line, port, sent, taken)]
     assert numbers == sorted(numbers)
-    await line.stop()
 
 
-async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line) -> None:
+async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line, port: FcPort) -> None:
     """At another speed they would be arbitrary bytes to the flight controller."""
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
     port.set_speed(9600)
     await until_async(lambda: port.write(bytes(4000)) or port.dropped_bytes, "a full port")  # type: ignore[func-returns-value]
     port.set_speed(57600)
@@ -305,10 +291,8 @@ async def test_queued_frames_are_dropped_when_the_speed_changes(line: Line) -> N
     assert bytes(came) == b"for the new speed"
 
 
-async def test_unsent_bytes_are_dropped_when_the_port_closes(line: Line) -> None:
+async def test_unsent_bytes_are_dropped_when_the_port_closes(line: Line, port: FcPort) -> None:
     """Closing would wait for them: up to 30 s on a USB board that hangs."""
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
     await until_async(lambda: port.write(bytes(4000)) or port.dropped_bytes, "a full port")  # type: ignore[func-returns-value]
     await line.stop()
     on_the_wire = 4096
@@ -358,10 +342,8 @@ async def test_usb_chips_deliver_short_replies_at_once(line: Line, monkeypatch: 
 
 @pytest.mark.parametrize("error", [OSError("unplugged"), termios.error(5, "unplugged"), ValueError("unplugged")])
 async def test_a_port_that_does_not_take_a_speed_counts_as_lost(
-    line: Line, error: Exception, monkeypatch: pytest.MonkeyPatch
+    line: Line, port: FcPort, error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened, "the port")
 
     def refuse(*_args: object) -> None:
         raise error
@@ -369,57 +351,39 @@ async def test_a_port_that_does_not_take_a_speed_counts_as_lost(
     monkeypatch.setattr(serial.Serial, "baudrate", property(refuse, refuse))
     port.set_speed(57600)
     assert "unplugged" in line.lost[0]
-    await line.stop()
+
+
+async def tried_once(port: FcPort, opener: AsyncMock, failed: Callable[[], object]) -> None:
+    running = asyncio.get_running_loop().create_task(port.run())
+    await until_async(failed, "the failure")
+    for _ in range(50):
+        await asyncio.sleep(0)
+    assert opener.await_count == 1
+    running.cancel()
+    await asyncio.wait([running])
 
 
 async def test_after_each_loss_there_is_a_pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """A TCP adapter that is in use accepts a connection and closes it at once."""
     monkeypatch.setattr("service.daemon.fc_connection._RETRY_S", 3600)
-    opened = 0
-    lost: list[str] = []
-
-    async def open_device() -> socket.socket:
-        nonlocal opened
-        opened += 1
-        near, far = socket.socketpair()
-        far.close()
-        return near
-
-    port = FcPort(open_device, lambda: None, lambda _data, _now: None, lost.append, Traffic())
-    running = asyncio.get_running_loop().create_task(port.run())
-    await until_async(lambda: lost, "the loss")
-    for _ in range(50):
-        await asyncio.sleep(0)
-    assert opened == 1
-    running.cancel()
-    await asyncio.wait([running])
+    near, far = socket.socketpair()
+    far.close()
+    opener, lost = AsyncMock(return_value=near), list[str]()
+    port = FcPort(opener, lambda: None, lambda _data, _now: None, lost.append, Traffic())
+    await tried_once(port, opener, lambda: lost)
 
 
 async def test_a_port_in_use_is_tried_less_often(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each try searches all processes for the program that uses it."""
     monkeypatch.setattr("service.daemon.fc_connection._RETRY_S", 0)
     monkeypatch.setattr("service.daemon.fc_connection._IN_USE_RETRY_S", 3600)
-    tried = 0
-
-    async def open_device() -> serial.Serial:
-        nonlocal tried
-        tried += 1
-        return open_serial(str(line.path))
-
+    opener = AsyncMock(side_effect=lambda: open_serial(str(line.path)))
+    port = FcPort(opener, lambda: None, lambda _data, _now: None, lambda _why: None, Traffic())
     with serial.Serial(str(line.path), exclusive=True):
-        port = FcPort(open_device, lambda: None, lambda _data, _now: None, lambda _why: None, Traffic())
-        running = asyncio.get_running_loop().create_task(port.run())
-        await until_async(lambda: port.trouble, "the failure")
-        for _ in range(50):
-            await asyncio.sleep(0)
-        assert tried == 1
-        running.cancel()
-        await asyncio.wait([running])
+        await tried_once(port, opener, lambda: port.trouble)
 
 
-async def test_a_lent_port_is_closed_until_it_comes_back(line: Line) -> None:
-    port = line.start()
-    await until_async(lambda: line.opened == 1, "the port")
+async def test_a_lent_port_is_closed_until_it_comes_back(line: Line, port: FcPort) -> None:
     async with port.lend():
         assert line.lost == ["the port is used for new firmware"]
         device = open_serial(str(line.path))  # exclusive
@@ -427,7 +391,6 @@ async def test_a_lent_port_is_closed_until_it_comes_back(line: Line) -> None:
         assert line.opened == 1
         device.close()
     await until_async(lambda: line.opened == 2, "the port again")
-    await line.stop()
 
 
 async def test_a_port_is_lent_while_it_cannot_be_opened_and_comes_back_after_an_error(line: Line) -> None:
@@ -439,4 +402,3 @@ async def test_a_port_is_lent_while_it_cannot_be_opened_and_comes_back_after_an_
             device.close()
             raise ZeroDivisionError
     await until_async(lambda: line.opened == 1, "the port")
-    await line.stop()
