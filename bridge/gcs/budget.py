@@ -79,7 +79,7 @@ class TokenBucket:
         self._used += amount
 
     def take(self, now: float) -> bool:
-        """Count one. False if it exceeds the limit. As `has` and `spend`, which would be two calls for each frame."""
+        """Count one. False if it exceeds the limit."""
         used = max(0.0, self._used - max(0.0, now - self._counted_at) * self._rate.per_s)
         self._counted_at = now
         is_allowed = used + 1.0 <= self._rate.burst
