@@ -12,7 +12,7 @@ _ROOT = Path(__file__).resolve().parents[1]
 _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
 #: Raised once: the texts for pilots are in a table of their own (bridge/voice).
-CEILINGS = {_INSTALLED: 41_826, ("bridge",): 17_763}
+CEILINGS = {_INSTALLED: 41_819, ("bridge",): 17_761}
 
 
 def lines(packages: tuple[str, ...]) -> int:

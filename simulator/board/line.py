@@ -12,7 +12,7 @@ _FRAME_BITS = 10
 def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
     """The bytes that a receiver at `read_baud` gets from `data` sent back to back at `sent_baud`.
 
-    8N1 as on the STM32: wait for the falling edge, sample each bit in its middle, and deliver a byte even if its stop
+    8N1 as on the STM32: wait for the falling edge, sample each bit in the middle, and deliver a byte even if its stop
     bit is low. So a wrong speed gives exactly the bytes that it would give on a wire, including harmful bytes. Speed 0
     is a disconnected port.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The interface between a simulated MSP board and its firmware: INAV, MultiWii, and those with telemetry only."""
+"""The interface between a simulated MSP board and the firmware: INAV, MultiWii, and those with telemetry only."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PIDs, modes, rates and MISC of boards that have no command to list their settings, from one boot to the next."""
+"""PIDs, modes, rates and MISC of boards that lack a command to list their settings, from one boot to the next."""
 
 from collections.abc import Mapping
 

@@ -13,7 +13,7 @@ GATHER_SECONDS = 0.004
 
 
 class ReceiveRing:
-    """`baud` None: a socket, on which bytes take no time. `size`: of the ring, bytes."""
+    """`baud` None: a socket, on which bytes arrive at once. `size`: of the ring, bytes."""
 
     def __init__(self, baud: int | None, size: int, counters: Counters) -> None:
         self._set_speed(baud)

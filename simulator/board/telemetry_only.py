@@ -95,7 +95,7 @@ BASEFLIGHT = Dialect(
 
 
 class TelemetryFirmware(MspFirmware):
-    """Stores no missions."""
+    """Cannot store missions."""
 
     def __init__(self, dialect: Dialect, boot: Boot) -> None:
         super().__init__(boot)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`naze-bridge sim --image`: the emulated board on its plug, on a bench or in a simulated sky."""
+"""`naze-bridge sim --image`: the emulated board, on a bench or in a simulated sky."""
 
 import asyncio
 import time

@@ -220,7 +220,7 @@ class EmulatedNaze(SimulatedBoard):
         self._boot(now)
 
     def _leave_boot_loader(self) -> None:
-        """Replace the chip: its core holds a copy of the program, whose end may have changed."""
+        """Replace the chip: the core holds a copy of the program, whose end may have changed."""
         self._boot_loader = None
         now_ns = self._chip.now_ns
         program = bytes(self.flash[:PROGRAM_END]).rstrip(b"\xff")

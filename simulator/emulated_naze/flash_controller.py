@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The flash and its controller: keys, the rules of NOR, and a stalled core (PM0075, sections 2.3 and 3)."""
+"""The flash and the controller: keys, the rules of NOR, and a stalled core (PM0075, sections 2.3 and 3)."""
 
 import random
 from collections.abc import Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The emulated board in a quadcopter: its motors carry it, the sensors feel it, and a GPS module is on USART2."""
+"""The emulated board in a quadcopter: the motors carry it, the sensors feel it, and a GPS module is on USART2."""
 
 import random
 from dataclasses import dataclass

@@ -25,7 +25,7 @@ class Image:
 
 
 def load_image(data: bytes, name: str) -> Image:
-    """Parse a file by its name: .hex and .bin, anything else is an ELF file. ImageError."""
+    """Parse a file by name: .hex and .bin, anything else is an ELF file. ImageError."""
     if name.lower().endswith((".hex", ".bin")):
         return Image(parse_image(data, name))
     try:

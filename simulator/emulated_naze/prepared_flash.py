@@ -51,7 +51,7 @@ def prepared_flash(image: Image, say: Callable[[str], None] = lambda _: None, li
 def prepare(image: Image, lines: tuple[str, ...] = ()) -> bytes:
     """A blank board with this image after the usual preparation and `lines` for the command line. ConsoleError.
 
-    A line that the firmware does not know has no effect.
+    Lines that the firmware does not know are ignored.
     """
     naze = FlyingNaze(image)
     console = Console(naze)

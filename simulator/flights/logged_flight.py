@@ -86,7 +86,7 @@ def logged_sortie(log: bytes, records: Sequence[WpRecord]) -> Sortie:
 
 
 def _messages(log: bytes) -> Iterator[tuple[float, Message]]:
-    """Each message with its time, s. A record that is cut off ends the log."""
+    """Each message with the time, s. A record that is cut off ends the log."""
     at = 0
     while at + 10 < len(log):
         start = at + 8

@@ -75,7 +75,7 @@ Intervention = Callable[[Pilot, FlightProgress], None]
 
 
 def fly_mission(pilot: Pilot, records: Sequence[WpRecord], intervene: Intervention = lambda *_: None) -> MissionRun:
-    """Arm, take off (by hand if the list has no TAKEOFF), switch GPS AUTO on, and watch. PilotError."""
+    """Arm, take off (by hand if the list lacks a TAKEOFF), switch GPS AUTO on, and watch. PilotError."""
     pilot.arm()
     switches = pilot.naze.faults
     if len(records) > 1 and records[1].command == WpCommand.TAKEOFF:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""INAV's waypoint list in RAM and its copy in the EEPROM, including requests that it acknowledges but ignores.
+"""INAV's waypoint list in RAM and the copy in the EEPROM, including requests that it acknowledges but ignores.
 
 After setWaypoint, getWaypoint, loadNonVolatileWaypointList and saveNonVolatileWaypointList of INAV 6.1.1 to 9.1.0
 (src/main/navigation/navigation.c).

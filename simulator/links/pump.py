@@ -15,7 +15,7 @@ _LONGEST_SLEEP = 0.25
 
 
 class Pump:
-    """Owns only its timer and reader: `fd` is non-blocking and stays the caller's.
+    """Owns only the timer and reader: `fd` is non-blocking and stays the caller's.
 
     `far_baud` returns the speed set at the other end. Without it both ends always agree. `on_hangup` is
     called when the other end is gone.

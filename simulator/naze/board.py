@@ -52,7 +52,7 @@ class SimulatedNaze(SimulatedBoard):
         self._boot_missions = boot_missions
         self._uart = Uart(self.options.baud, self.counters, self.options.tree.value)
         self._boots_at = 0.0
-        # None while the board boots or has no power.
+        # None while the board boots or is without power.
         self._firmware: Firmware | None = None
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Harakiri from one boot to the next: its main loop, and the serial port as in serialCom (serial.c, mw.c).
+"""Harakiri from one boot to the next: the main loop, and the serial port as in serialCom (serial.c, mw.c).
 
 This object is the RAM, so a new object is a reset.
 """

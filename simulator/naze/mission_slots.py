@@ -188,7 +188,7 @@ class StoredConfig:
         return self._flash.read((self._place + 1) * PAGE_SIZE - _CONFIG.size - size, size) if has_settings else b""
 
     def _settings(self, page: int) -> bytes:
-        """The settings without leading FF bytes, which need no programming."""
+        """The settings without leading FF bytes, which are not programmed."""
         return self._flash.read(page * PAGE_SIZE, PAGE_SIZE - _CONFIG.size).lstrip(bytes((ERASED,)))
 
     def _program(self, page: int, wp_radius_cm: int, settings: bytes, seal: int, seconds: float) -> None:

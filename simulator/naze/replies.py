@@ -31,7 +31,7 @@ Reply = Info | Staged | Stored | Records | Radius | SettingsReply | TableReply
 
 
 def unmask(payload: bytes) -> bytes | None:
-    """A request's payload without its mask, or None if it is not masked."""
+    """A request's payload without the mask, or None if it is not masked."""
     return apply_mask(payload[1:], payload[0]) if len(payload) % 2 else None
 
 
