@@ -4,8 +4,8 @@
 import asyncio
 import json
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,9 @@ class Doors:
             await asyncio.sleep(_LOOK_S)
 
 
+Story = Callable[[Doors], Awaitable[None]]
+
+
 @asynccontextmanager
 async def _opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Doors]:
     many = [
@@ -108,8 +111,11 @@ async def _opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterato
     running = asyncio.create_task(daemon.run())
     await daemon.started.wait()
     parts[1].start()
+    doors = Doors(daemon, udp, tcp, share, web, folder / "control")
     try:
-        yield Doors(daemon, udp, tcp, share, web, folder / "control")
+        while "error" in await doors.ask({"do": "settings"}):  # noqa: ASYNC110  # the daemon has no such event
+            await asyncio.sleep(_LOOK_S)
+        yield doors
     finally:
         for part in parts:
             await part.close()
@@ -118,16 +124,17 @@ async def _opened(folder: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterato
         link.stop()
 
 
-def work_of(story: Callable[[Doors], Awaitable[None]], folder: Path, monkeypatch: pytest.MonkeyPatch) -> Work:
-    """The work of the loop's steps during `story`, which begins once the board's settings were read."""
+@contextmanager
+def open_doors(folder: Path) -> Iterator[Callable[[Story], Work]]:
+    """A function for the work of the loop's steps during a story. The board's settings were read before."""
+    with pytest.MonkeyPatch.context() as monkeypatch, asyncio.Runner(loop_factory=event_loop.EventLoop) as runner:
+        opened = _opened(folder, monkeypatch)
+        doors = runner.run(opened.__aenter__())
 
-    async def main() -> Work:
-        async with _opened(folder, monkeypatch) as doors:
-            while "error" in await doors.ask({"do": "settings"}):  # noqa: ASYNC110  # the daemon has no such event
-                await asyncio.sleep(_LOOK_S)
+        async def counts(story: Story) -> Work:
             with counted() as work:
                 await story(doors)
-        return work
+            return work
 
-    with asyncio.Runner(loop_factory=event_loop.EventLoop) as runner:
-        return runner.run(main())
+        yield lambda story: runner.run(counts(story))
+        runner.run(opened.__aexit__(None, None, None))
