@@ -7,7 +7,7 @@ import pytest
 
 from protocols.msp.frame import Direction, MspFrame, request
 from simulator.board.msp_sensors import MspCommand
-from tests.support.mavlink_parameters import armed_a_set_is_ignored
+from tests.support.mavlink_ground import MavlinkGround
 from tests.support.real_bench import Figure, RealBench
 
 #: Harakiri's reads that take any payload, and the extension's requests, which check the armed flag themselves.
@@ -97,4 +97,4 @@ def test_setters_of_the_right_size_still_work(guarded: RealBench) -> None:
 def test_armed_a_mavlink_parameter_set_is_ignored(guarded: RealBench) -> None:
     guarded.configure(tele_prot=2)
     guarded.arm()
-    armed_a_set_is_ignored(guarded)
+    assert MavlinkGround(guarded).set_parameter("p_roll", 44) == []

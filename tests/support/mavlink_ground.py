@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ground station directly on a board's UART, for Harakiri's own MAVLink upload."""
+"""A ground station directly on a board's UART, for Harakiri's own MAVLink upload and parameters."""
 
 from collections.abc import Mapping
 
@@ -46,6 +46,14 @@ class MavlinkGround:
             if self._bench.now >= end:
                 return None
             self._frames += self._splitter.feed(self._bench.run(0.02))
+
+    def set_parameter(self, name: str, value: float) -> list[str]:
+        """Set a parameter; return the names and indexes that the board reports."""
+        self.send(m.MAVLink_param_set_message(*_BOARD, name.encode(), value, m.MAV_PARAM_TYPE_REAL32))
+        answers = []
+        while (answer := self.wait(m.MAVLINK_MSG_ID_PARAM_VALUE, seconds=0.5)) is not None:
+            answers.append(f"{answer.param_id} {answer.param_index}")
+        return answers
 
     def answer_to(self, message: Message) -> int | None:
         """The result of the ACK to a message."""

@@ -144,56 +144,22 @@ def test_a_leg_without_a_position_or_with_the_home_flag_leads_home(home: NavWayp
     assert flight.away_from(waypoint(0)) < 5
 
 
-def sets_index(bench: MspBench, *index: int) -> bool:
-    """MSP2_INAV_SET_WP_INDEX; False: an error."""
-    bench.send(request(SET_WP_INDEX, bytes(index)))
-    (frame,) = MspParser().feed(bench.run(0.05))
-    return frame.direction is Direction.REPLY
-
-
-def test_another_waypoint_is_flown_to_and_the_mission_goes_on_from_there() -> None:
-    flight = Flight(waypoint(20), waypoint(40), waypoint(60), waypoint(80))
-    flight.until(lambda status: status[:2] == (NAV, 5))
-    assert sets_index(flight.bench, 2)
-    flight.until(is_finished)
-    assert flight.numbers() == [1, 3, 4]
-
-
-def test_a_waypoint_without_a_place_leads_to_the_next() -> None:
-    flight = Flight(waypoint(20), waypoint(30, NavAction.SET_POI), waypoint(40), waypoint(60))
-    flight.until(lambda status: status[:2] == (NAV, 5))
-    assert sets_index(flight.bench, 1)
-    flight.bench.run(0.1)
-    assert flight.status() == (NAV, 5, 1, 3, 0)
-
-
 def test_the_index_is_refused_on_the_ground_outside_of_the_mission_and_beyond_it() -> None:
-    flight = Flight(waypoint(20), waypoint(40), waypoint(0, NavAction.RTH))
-    assert not sets_index(flight.bench, 0)
+    """tests/bridge/vehicle/test_set_waypoint.py flies to another waypoint."""
+    flight = Flight(waypoint(20), waypoint(40))
+
+    def direction(*index: int) -> Direction:
+        flight.bench.send(request(SET_WP_INDEX, bytes(index)))
+        (frame,) = MspParser().feed(flight.bench.run(0.05))
+        return frame.direction
+
+    assert direction(0) is Direction.ERROR
     flight.until(lambda status: status[:2] == (NAV, 5))
-    assert not any(sets_index(flight.bench, *index) for index in ((3,), (255,), (), (1, 0)))
-    assert sets_index(flight.bench, 2)
-    flight.bench.run(0.5)
-    assert flight.status()[0] == RTH
-    assert not sets_index(flight.bench, 0)
+    assert {direction(*index) for index in ((2,), (255,), (), (1, 0))} == {Direction.ERROR}
+    assert direction(1) is Direction.REPLY
     flight.bench.faults.boxes = 0
     flight.bench.run(0.5)
-    assert not sets_index(flight.bench, 0)
-
-
-def test_a_landing_goes_on_under_the_new_number() -> None:
-    flight = Flight(waypoint(20), waypoint(30, NavAction.LAND))
-    flight.until(lambda status: status[1] == 9)
-    assert sets_index(flight.bench, 0)
-    flight.bench.run(0.5)
-    assert flight.status() == (NAV, 9, 1, 1, 11)
-
-
-def test_older_versions_lack_the_request() -> None:
-    flight = Flight(waypoint(20), waypoint(40), version="9.0.1")
-    flight.until(lambda status: status[:2] == (NAV, 5))
-    assert not sets_index(flight.bench, 1)
-    assert flight.status()[3] == 1
+    assert direction(0) is Direction.ERROR
 
 
 ANGLE = 1 << 3

@@ -97,17 +97,6 @@ def status(bench: MspBench) -> tuple[int, ...]:
     return struct.unpack("<5Bh", bench.payload(121))[:5]
 
 
-def test_a_mission_ends_with_a_landing_at_home() -> None:
-    bench = flying()
-    numbers = []
-    while status(bench)[1] != 10:
-        numbers.append(status(bench)[3])
-        bench.run(0.5)
-        assert bench.now < 300
-    assert sorted(set(numbers)) == [1, 2, 3, 4]
-    assert numbers == sorted(numbers)
-
-
 @pytest.mark.parametrize(("p1", "state"), [(0, 3), (7, 10)])
 def test_a_return_home_lands_if_the_waypoint_read_last_has_p1(p1: int, state: int) -> None:
     bench = MspBench("multiwii", faults=Faults(boxes=0))

@@ -42,31 +42,6 @@ def test_the_arm_bit_of_status_is_at_the_index_of_arm_in_boxnames(armed: bool) -
     assert bool(flags >> names.index(b"ARM") & 1) is armed
 
 
-def test_waypoint_0_is_home_while_armed_and_16_the_hold_position() -> None:
-    bench = Bench()
-    assert struct.unpack("<BiiHB", bench.payload(request(118, b"\x00"))) == (0, 0, 0, 0, 0)
-    bench.naze.faults.armed = True
-    bench.run(10)
-    home, hold = bench.payload(request(118, b"\x00")), bench.payload(request(118, b"\x10"))
-    assert struct.unpack("<BiiHB", home) == (0, 453838000, 84733000, 0, 0)
-    assert struct.unpack("<BiiHB", hold)[0] == 16
-    distance, direction, _ = struct.unpack("<HhB", bench.payload(request(107)))
-    assert distance == pytest.approx(24, abs=1)  # 10 s at 2.5 m/s along a circle
-    assert direction == pytest.approx(-152, abs=2)  # north-north-east of home, so home is south-south-west
-
-
-def test_the_truth_matches_the_sensors() -> None:
-    bench = Bench(faults=Faults(armed=True, boxes=0b101))
-    bench.run(20)
-    truth = bench.naze.truth(bench.now)
-    assert truth is not None
-    assert (truth.armed, truth.boxes, truth.home) == (True, 5, (453838000, 84733000))
-    roll, pitch, heading, _ = struct.unpack("<4h", bench.payload(request(108)))
-    flight = truth.flight
-    assert (roll, pitch, heading) == pytest.approx((flight.roll * 10, flight.pitch * 10, flight.heading), abs=1.5)
-    assert struct.unpack_from("<I", bench.payload(request(101)), 6) == (0b100101,)
-
-
 @pytest.mark.parametrize(("command", "seconds"), [(205, 9.4), (206, 61.0)])
 def test_a_calibration_is_acknowledged_freezes_the_board_and_restarts_it(command: int, seconds: float) -> None:
     bench = Bench()

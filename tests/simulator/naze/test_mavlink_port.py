@@ -8,7 +8,7 @@ from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink2
 
 from protocols.msp.frame import request
-from simulator.board.options import Faults, SimOptions, TelemetryProtocol
+from simulator.board.options import SimOptions, TelemetryProtocol
 from simulator.naze.firmware import Protocol
 from simulator.naze.replies import encode_radius
 from tests.support.naze_bench import Bench
@@ -87,33 +87,6 @@ def test_the_stream_has_the_firmwares_rates() -> None:
         "ATTITUDE": 28.5, "SCALED_PRESSURE": 0.5,
     }  # fmt: skip
     assert rates == pytest.approx(expected, rel=0.06)
-
-
-def test_the_stream_matches_a_flight() -> None:
-    bench = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), Faults(armed=True))
-    messages = decode(bench.run(60))
-    fixes = [message for message in messages if message.get_type() == "GPS_RAW_INT"]
-    assert {(fix.fix_type, fix.satellites_visible) for fix in fixes} == {(3, 9)}
-    for axis, home in (("lat", 453838000), ("lon", 84733000)):
-        positions = [getattr(fix, axis) for fix in fixes]
-        assert 1000 < max(positions) - min(positions) < 20_000
-        assert all(abs(position - home) < 20_000 for position in positions)
-    heartbeat = next(message for message in messages if message.get_type() == "HEARTBEAT")
-    assert heartbeat.base_mode & mavlink1.MAV_MODE_FLAG_SAFETY_ARMED
-    volts = [message.voltage_battery for message in messages if message.get_type() == "SYS_STATUS"]
-    assert volts[0] == 12600
-    assert 11500 < volts[-1] < volts[0]
-
-
-def test_nose_down_is_positive_in_msp_and_negative_in_mavlink() -> None:
-    armed = Faults(armed=True)
-    attitude = Bench(faults=armed)
-    attitude.run(1.0)
-    assert int.from_bytes(attitude.payload(request(108))[2:4], "little", signed=True) > 10
-    stream = Bench(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), armed)
-    pitches = [message.pitch for message in decode(stream.run(1.0)) if message.get_type() == "ATTITUDE"]
-    assert pitches
-    assert all(pitch < -0.01 for pitch in pitches)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 """The flight controller's side of docs/msp-mission.md, through the UART."""
 
 import pytest
-from hypothesis import strategies as st
 
 from protocols.mission_item import ListIdentity, identify, pack_records
 from protocols.msp.mission import (
@@ -10,7 +9,6 @@ from protocols.msp.mission import (
     INFO_REQUEST,
     Info,
     ReplyStatus,
-    WpRecord,
     decode_info,
     encode_begin,
     encode_chunk,
@@ -23,18 +21,6 @@ from tests.support.naze_bench import BOOT_SECONDS, Bench, mission
 
 NOTHING = ListIdentity(0, 0)
 LINE_RATE = 115200 / 10
-
-records_of_any_kind = st.builds(
-    WpRecord,
-    lat_e7=st.integers(-900_000_000, 900_000_000),
-    lon_e7=st.integers(-1_800_000_000, 1_800_000_000),
-    height_m=st.integers(-32767, 32767),
-    roi_heading=st.integers(0, 1),
-    time=st.integers(0, 255),
-    radius_m=st.integers(0, 255),
-    turns=st.integers(-127, 127),
-    command=st.integers(0, 7),
-)
 
 
 def info(bench: Bench) -> Info:
