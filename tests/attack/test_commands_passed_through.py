@@ -6,7 +6,6 @@ import socket
 import threading
 from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -85,9 +84,7 @@ def autopilot(stack: ExitStack) -> Autopilot:
 
 def passing(start: Starter, autopilot: Autopilot, settings: str) -> Daemon:
     link = f"udpin:127.0.0.1:{free_port()}"
-    config = start.directory / "naze-bridge.toml"
-    config.write_text(settings.replace("LINK", link))
-    daemon = start.daemon(autopilot.fc, [link], options=("--config", str(config)))
+    daemon = start.daemon(autopilot.fc, [link], config=settings.replace("LINK", link))
     daemon.port = int(link.rpartition(":")[2])
     daemon.wait("MAVLink")
     return daemon
@@ -149,11 +146,8 @@ def test_commands_pass_with_a_list_of_writers(start: Starter, autopilot: Autopil
         assert happens(lambda: kinds <= set(autopilot.kinds())), autopilot.kinds()
 
 
-def test_signed_commands_pass(start: Starter, autopilot: Autopilot, tmp_path: Path) -> None:
-    key_file = tmp_path / "gcs.key"
-    key_file.write_text("loop the loop\n")
-    key_file.chmod(0o600)
-    daemon = passing(start, autopilot, f'gcs = [{{address = "LINK", key_file = "{key_file}"}}]\n')
+def test_signed_commands_pass(start: Starter, autopilot: Autopilot) -> None:
+    daemon = passing(start, autopilot, f'gcs = [{{address = "LINK", key_file = "{start.key_file()}"}}]\n')
     with udp_station(daemon.address) as pilot, udp_station(daemon.address) as stranger:
         sign(pilot._codec, "loop the loop")
         stranger.send(HELLO)

@@ -4,9 +4,6 @@
 import itertools
 import socket
 from contextlib import ExitStack
-from pathlib import Path
-
-import pytest
 
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
@@ -21,19 +18,9 @@ PASSPHRASE = "loop the loop"  # noqa: S105 - it is only ours
 CROWD = 48
 
 
-@pytest.fixture
-def key_file(tmp_path: Path) -> Path:
-    path = tmp_path / "gcs.key"
-    path.write_text(PASSPHRASE + "\n")
-    path.chmod(0o600)
-    return path
-
-
-def guarded(start: Starter, key_file: Path) -> Bench:
+def guarded(start: Starter) -> Bench:
     link = f"udpin:127.0.0.1:{free_port()}"
-    config = start.directory / "naze-bridge.toml"
-    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
-    bench = start.bench(gcs=[link], daemon_options=("--config", str(config)))
+    bench = start.bench(gcs=[link], config=f'gcs = [{{address = "{link}", key_file = "{start.key_file()}"}}]\n')
     bench.daemon.port = int(link.rpartition(":")[2])
     return bench
 
@@ -93,8 +80,8 @@ def test_a_crowd_does_not_displace_a_pilot(start: Starter, stack: ExitStack) -> 
             assert_uploads(pilot, bench.board, plain_plan(20))
 
 
-def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, stack: ExitStack, key_file: Path) -> None:
-    bench = guarded(start, key_file)
+def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, stack: ExitStack) -> None:
+    bench = guarded(start)
     with crowd(bench, stack) as attack:
         assert happens(lambda: attack.count > 2 * CROWD)
         with udp_station(bench.daemon.address) as pilot:
@@ -116,9 +103,9 @@ def test_strangers_on_a_keyed_link_do_not_displace_the_pilot(start: Starter, sta
         assert "STATUSTEXT" not in {message.get_type() for message in listener.received}
 
 
-def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stack: ExitStack, key_file: Path) -> None:
+def test_an_unsigned_frame_does_not_change_the_pilots_rates(start: Starter, stack: ExitStack) -> None:
     """Forged: unsigned, from the pilot's own address."""
-    bench = guarded(start, key_file)
+    bench = guarded(start)
     with udp_station(bench.daemon.address) as pilot:
         sign(pilot._codec, PASSPHRASE)
         pilot.send(HELLO)

@@ -18,7 +18,7 @@ from tests.support.attack_pilot import HELLO, Attack, Stranger, Watch, assert_up
 from tests.support.benches import Starter
 from tests.support.plain_station import udp_station
 from tests.support.plan import plain_plan
-from tests.support.programs import NAZE_BRIDGE, REPOSITORY, Daemon, free_port, happens, until
+from tests.support.programs import NAZE_BRIDGE, REPOSITORY, Daemon, free_port, happens, run_naze_bridge, until
 from tests.support.web_bench import WebBench
 
 
@@ -27,9 +27,7 @@ def logs(state_dir: Path) -> list[Path]:
 
 
 def test_the_log_of_a_flight_survives_a_flood(start: Starter, stack: ExitStack) -> None:
-    config = start.directory / "naze-bridge.toml"
-    config.write_text("tlog_total_mb = 3\n")
-    bench = start.bench(daemon_options=("--config", str(config)))
+    bench = start.bench(config="tlog_total_mb = 3\n")
     state = bench.daemon.state_dir
     pilot = Stranger(bench.daemon.address, sysid=255)
     stack.callback(pilot.close)
@@ -48,14 +46,9 @@ def test_the_log_of_a_flight_survives_a_flood(start: Starter, stack: ExitStack) 
     assert sum(path.stat().st_size for path in logs(state)) < 600_000
 
 
-def test_refused_frames_are_not_recorded(start: Starter, stack: ExitStack, tmp_path: Path) -> None:
-    key_file = tmp_path / "gcs.key"
-    key_file.write_text("loop the loop\n")
-    key_file.chmod(0o600)
+def test_refused_frames_are_not_recorded(start: Starter, stack: ExitStack) -> None:
     link = f"udpin:127.0.0.1:{free_port()}"
-    config = tmp_path / "naze-bridge.toml"
-    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
-    bench = start.bench(gcs=[link], daemon_options=("--config", str(config)))
+    bench = start.bench(gcs=[link], config=f'gcs = [{{address = "{link}", key_file = "{start.key_file()}"}}]\n')
     stranger = Stranger(("127.0.0.1", int(link.rpartition(":")[2])), sysid=77)
     stack.callback(stranger.close)
     for _ in range(20):
@@ -71,9 +64,8 @@ def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_
     blocked.write_text("a file in place of the folder")
     board = start.board()
     port = free_port(socket.SOCK_STREAM)
-    config = tmp_path / "naze-bridge.toml"
-    config.write_text(f'[web]\nlisten = "127.0.0.1:{port}"\n')
-    daemon = start.daemon(str(board.link), state_dir=blocked / "state", options=("--config", str(config)))
+    config = f'[web]\nlisten = "127.0.0.1:{port}"\n'
+    daemon = start.daemon(str(board.link), state_dir=blocked / "state", config=config)
     daemon.wait()
     with Watch(daemon) as monitor, udp_station(daemon.address) as pilot:
         pilot.send(HELLO)
@@ -85,6 +77,11 @@ def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_
     status = daemon.status()
     assert status is not None
     assert "cannot" in status["store_trouble"]
+    assert "kept in memory only" in run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
+    second = run_naze_bridge(
+        "run", "--fc", "sim:", "--gcs", f"udpin:127.0.0.1:{free_port()}", "--state-dir", daemon.state_dir
+    )
+    assert (second.returncode, "another daemon answers on" in second.stderr) == (1, True), second
     until(lambda: daemon.has_logged("web.listening"), "the page")
     page = WebBench(daemon, None, port)
     assert page.ask("/api/state").data["store_trouble"] == status["store_trouble"]
@@ -93,10 +90,17 @@ def test_without_a_state_directory_the_daemon_keeps_working(start: Starter, tmp_
     assert "read-only" in refused.data["error"]
 
 
-class DaemonWithoutDisk(Daemon):
-    """Its disk never responds, like an SD card that hangs in the kernel."""
+class FreshDaemon(Daemon):
+    """A daemon in a new interpreter."""
 
-    _HANGING = """
+    command: tuple[str, ...] = ()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        with self._output.open("ab") as output:
+            return subprocess.Popen([*self.command, *self._arguments], cwd=REPOSITORY, stdout=output, stderr=output)
+
+
+_HANGING = """
 import os, threading
 from storage.mission_store import MissionStore
 def hang(*arguments): threading.Event().wait()
@@ -105,10 +109,11 @@ from service.cli.main import main
 main(prog_name="naze-bridge")
 """
 
-    def _start(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-c", self._HANGING, *self._arguments]
-        with self._output.open("ab") as output:
-            return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
+
+class DaemonWithoutDisk(FreshDaemon):
+    """The disk never responds, like an SD card that hangs in the kernel."""
+
+    command = (sys.executable, "-c", _HANGING)
 
 
 def test_the_daemon_works_and_stops_while_the_disk_hangs(start: Starter, stack: ExitStack) -> None:
@@ -131,13 +136,10 @@ _SAVED_NOTHING = {
 }
 
 
-class DaemonThatObeysModes(Daemon):
-    """Runs in a new interpreter without root's right to ignore the modes of files."""
+class DaemonThatObeysModes(FreshDaemon):
+    """Runs without root's right to ignore the modes of files."""
 
-    def _start(self) -> subprocess.Popen[bytes]:
-        command = [*_OBEYING_MODES, *NAZE_BRIDGE, *self._arguments]
-        with self._output.open("ab") as output:
-            return subprocess.Popen(command, cwd=REPOSITORY, stdout=output, stderr=output)
+    command = (*_OBEYING_MODES, *NAZE_BRIDGE)
 
 
 @pytest.mark.parametrize("becomes", _SAVED_NOTHING)
@@ -145,12 +147,9 @@ def test_the_daemon_stops_cleanly_after_the_state_folder_was_lost(
     start: Starter, stack: ExitStack, becomes: str
 ) -> None:
     """What could not be saved is logged once."""
-    key_file, config = start.directory / "gcs.key", start.directory / "naze-bridge.toml"
-    key_file.write_text("loop the loop\n")
-    key_file.chmod(0o600)
     link = f"udpin:127.0.0.1:{free_port()}"
-    config.write_text(f'gcs = [{{address = "{link}", key_file = "{key_file}"}}]\n')
-    daemon = DaemonThatObeysModes(start.directory, "sim:", [link], options=("--config", str(config)))
+    config = f'gcs = [{{address = "{link}", key_file = "{start.key_file()}"}}]\n'
+    daemon = DaemonThatObeysModes(start.directory, "sim:", [link], config=config)
     stack.callback(daemon.end, signal.SIGKILL)
     daemon.wait()
     if becomes == "read-only":
@@ -175,10 +174,8 @@ MOST_OPEN_FILES = 300
 def test_connections_and_unread_replies_are_limited(start: Starter) -> None:
     """Each connection carries half a request, or an expensive one whose reply is not read."""
     page, tcp, udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM), free_port()
-    config = start.directory / "naze-bridge.toml"
-    config.write_text(f'[web]\nlisten = "127.0.0.1:{page}"\n')
     links = [f"udpin:127.0.0.1:{udp}", f"tcpin:127.0.0.1:{tcp}"]
-    bench = start.bench(gcs=links, daemon_options=("--config", str(config)))
+    bench = start.bench(gcs=links, config=f'[web]\nlisten = "127.0.0.1:{page}"\n')
     daemon = bench.daemon
     daemon.port = udp
     daemon.push(plain_plan(140))

@@ -2,34 +2,25 @@
 """A guest and another vehicle try to publish for a vehicle, through routers with the example configurations."""
 
 import time
-from contextlib import ExitStack
-from pathlib import Path
 
-import pytest
 import zenoh
 
 from tests.support.attack_pilot import Attack
 from tests.support.benches import Starter
 from tests.support.programs import run_naze_bridge
-from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
+from tests.support.secured_fleet import Fleet
 from tests.support.zenoh_bench import Reader, ask_surely, key, zenoh_bench
 from tests.support.zenoh_router import EXAMPLES
 
-
-@pytest.fixture(params=[tls_fleet, password_fleet], ids=["tls", "passwords"])
-def fleet(request: pytest.FixtureRequest, tmp_path: Path, stack: ExitStack) -> Fleet:
-    folder = tmp_path / "fleet"
-    folder.mkdir()
-    found: Fleet = request.param(folder, stack)
-    return found
+pytest_plugins = ("tests.support.secured_fixtures",)
 
 
-def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet) -> None:
-    bench = zenoh_bench(start, f'config_file = "{fleet.config("vehicle", "naze-1")}"\ncommands = true')
+def test_other_members_cannot_publish_for_a_vehicle(start: Starter, secured: Fleet) -> None:
+    bench = zenoh_bench(start, f'config_file = "{secured.config("vehicle", "naze-1")}"\ncommands = true')
     with (
-        fleet.open("pilot", "pilot") as pilot,
-        fleet.open("pilot", "guest") as guest,
-        fleet.open("vehicle", "naze-2") as other,
+        secured.open("pilot", "pilot") as pilot,
+        secured.open("pilot", "guest") as guest,
+        secured.open("vehicle", "naze-2") as other,
     ):
         # The guest only subscribes.
         assert Reader(guest, key("telemetry/*")).wait("telemetry/attitude")
@@ -48,7 +39,7 @@ def test_other_members_cannot_publish_for_a_vehicle(start: Starter, fleet: Fleet
         assert ask_surely(pilot, "state").keys() == truth.keys()
         assert [token for token in tokens if "forged" in token] == []
         with Attack(lambda: _flood(guest), per_s=200), Attack(lambda: _flood(other), per_s=200):
-            pilots = ("--zenoh-config", fleet.config("pilot", "pilot"))
+            pilots = ("--zenoh-config", secured.config("pilot", "pilot"))
             pushed = run_naze_bridge("fleet", "push", EXAMPLES / "naze-field.waypoints", "--vehicle", "naze-1", *pilots)
             assert pushed.returncode == 0, pushed
             pulled = run_naze_bridge("fleet", "pull", "--vehicle", "naze-1", *pilots)

@@ -17,45 +17,12 @@ from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import TIMEOUT_S, free_port, run_naze_bridge, until
 
 
-def test_an_invalid_connection_is_reported_in_one_sentence(tmp_path: Path) -> None:
-    """tests/service/settings/test_addresses.py has the other sentences."""
-    ended = run_naze_bridge("run", "--fc", "naze", "--state-dir", str(tmp_path))
-    assert ended.returncode == 2
-    sentence = ended.stderr.splitlines()[0]
-    assert sentence.startswith("naze-bridge: ")
-    assert "/dev/serial0" in sentence
-    assert "Traceback" not in ended.stderr
-
-
 def assert_refused(ended: subprocess.CompletedProcess[str], *parts: str) -> None:
     assert ended.returncode == 1
     (sentence,) = [line for line in ended.stderr.splitlines() if not line.startswith("{")]
     assert sentence.startswith("naze-bridge: ")
     for part in parts:
         assert part in sentence
-
-
-def test_a_second_daemon_on_one_port_is_refused(start: Starter, tmp_path: Path) -> None:
-    first = start.daemon("sim:")
-    first.wait_up()
-    link = f"udpin:127.0.0.1:{first.port}"
-    ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(tmp_path / "other"))
-    assert_refused(ended, link, "in use")
-    assert first.is_alive
-
-
-@pytest.mark.parametrize(
-    ("link", "advice"),
-    [
-        # An unknown network interface is found without a name server.
-        ("udpin:[fe80::1%no-card]:14550", "check the name and the network"),
-        ("udpin:203.0.113.1:14550", "this machine does not have that address"),
-    ],
-)
-def test_an_impossible_link_to_ground_stations_is_reported_in_one_sentence(
-    tmp_path: Path, link: str, advice: str
-) -> None:
-    assert_refused(run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", tmp_path), link, advice)
 
 
 def test_a_second_daemon_on_one_state_directory_is_refused(start: Starter) -> None:
@@ -66,27 +33,6 @@ def test_a_second_daemon_on_one_state_directory_is_refused(start: Starter) -> No
     assert_refused(ended, str(first.state_dir), "in use by process", "--state-dir")
     # The first one still answers.
     first.wait()
-
-
-def test_the_daemon_works_without_a_state_directory(start: Starter, tmp_path: Path) -> None:
-    """As with a dead disk. The missing store is reported everywhere."""
-    file = tmp_path / "file"
-    file.write_text("not a directory")
-    daemon = start.daemon("sim:", state_dir=file / "state")
-    daemon.wait()
-    link = f"udpin:127.0.0.1:{free_port()}"
-    second = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", str(daemon.state_dir))
-    assert_refused(second, "another daemon answers on", "--state-dir")
-    with udp_station(daemon.address) as station:
-        for _ in range(2):
-            station.send_heartbeat()
-        assert "memory" in station.wait_for("STATUSTEXT").text
-        assert station.upload(plain_plan(12)) == 0
-    assert [mission["outcome"] for mission in daemon.missions()] == ["VERIFIED"]
-    shown = run_naze_bridge("status", "--state-dir", daemon.state_dir).stdout
-    assert "kept in memory only" in shown
-    assert daemon.has_logged("store.unavailable")
-    assert daemon.end() == 0
 
 
 # -- the serial port -----------------------------------------------------------------------------------------
@@ -132,19 +78,6 @@ def test_a_missing_port_is_opened_when_it_appears(start: Starter) -> None:
 @pytest.mark.parametrize("path", ["/dev/null", __file__])
 def test_a_port_that_is_not_a_serial_port_is_reported(start: Starter, path: str) -> None:
     assert "is not a serial port" in complaint(start, Path(path))
-
-
-def test_a_port_used_by_another_program_is_reported(start: Starter, terminal: Path) -> None:
-    script = "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
-    with subprocess.Popen(
-        [sys.executable, "-c", script, str(terminal)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as other:
-        assert other.stdout is not None
-        assert other.stdout.readline() == "open\n"
-        why = complaint(start, terminal)
-        assert f"pid {other.pid}" in why
-        assert "busy" in why
-        other.kill()
 
 
 def test_a_port_used_by_a_login_console_is_reported(start: Starter, terminal: Path) -> None:

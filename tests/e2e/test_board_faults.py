@@ -70,6 +70,7 @@ def test_a_board_is_found_after_unplugging_during_a_write(bench: Bench, planner:
     assert_retry_works(bench, planner)
     lost = bench.daemon.has_logged("fc.port_lost")
     assert lost is not None
+    assert lost["level"] == "warning"
 
 
 def test_a_board_left_in_the_command_line_is_reported(start: Starter) -> None:

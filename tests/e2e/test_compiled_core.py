@@ -2,27 +2,17 @@
 """MAVSDK, daemon, pty and simulated UART with the flight controller's real C code."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
-from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawResult
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 
-from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
+from tests.e2e.test_mavsdk import fields, raw_items, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.c_core import library
-from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
+from tests.support.plan import expected_fields, judge, mixed_plan, records_of
 from tests.support.programs import run_naze_bridge, until
-
-OLD, NEW = mixed_plan(60), plain_plan(146, start=40)
-OLD_RECORDS, NEW_RECORDS = records_of(judge(OLD)), records_of(judge(NEW))
-
-
-def start_on_core(start: Starter) -> tuple[Bench, Path]:
-    """Start daemon and board; return them and the path of the board's flash."""
-    flash = start.directory / "flash"
-    return start.bench("--core", str(library()), "--state", str(flash)), flash
 
 
 def sealed_slots(flash: Path, records: list[str]) -> int:
@@ -32,12 +22,12 @@ def sealed_slots(flash: Path, records: list[str]) -> int:
     return sum(slot[:2] == b"NM" and slot[16:18] == b"\0\0" and slot[32:].startswith(wanted) for slot in slots)
 
 
-@pytest.fixture(scope="module")
-def core(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bench, Path]]:
-    with ExitStack() as stack:
-        bench, flash = start_on_core(Starter(tmp_path_factory.mktemp("core"), stack))
-        yield bench, flash
-        bench.board.assert_unharmed()
+@pytest.fixture
+def core(start: Starter, tmp_path: Path) -> Iterator[tuple[Bench, Path]]:
+    """A bench and the path of the board's flash."""
+    bench = start.bench("--core", str(library()), "--state", str(tmp_path / "flash"))
+    yield bench, tmp_path / "flash"
+    bench.board.assert_unharmed()
 
 
 async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> None:
@@ -57,24 +47,6 @@ async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> 
         until(lambda: board.records() == [], "an empty board")
         assert len(await missions.download_mission()) <= 1  # home
         assert board.stats()["flash_writes"] == written + 1
-
-
-async def test_a_power_cut_while_a_list_is_written_keeps_the_old_mission(start: Starter) -> None:
-    bench, flash = start_on_core(start)
-    bench.daemon.push(OLD)
-    bench.board.set(f"power_cut_at_flash_operation {len(NEW_RECORDS) // 2}")
-    async with vehicle_at(bench.daemon.port) as vehicle:
-        missions = MissionRawAsync(vehicle)
-        # On a loaded machine MAVSDK may give up first: it does not repeat its last item.
-        assert await refusal_of(missions, NEW) in (MissionRawResult.DENIED, MissionRawResult.TIMEOUT)
-        assert bench.board.stats()["power"] == "OFF"
-        assert bench.board.records() == OLD_RECORDS
-        assert (sealed_slots(flash, OLD_RECORDS), sealed_slots(flash, NEW_RECORDS)) == (1, 0)
-        bench.board.set("power on")
-        bench.daemon.wait()
-        assert bench.daemon.pull()["records"] == OLD_RECORDS
-        await missions.upload_mission(raw_items(NEW))
-    assert bench.board.records() == bench.daemon.pull()["records"] == NEW_RECORDS
 
 
 def test_a_library_that_is_not_the_core_is_refused(tmp_path: Path) -> None:

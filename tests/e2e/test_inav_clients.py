@@ -68,9 +68,7 @@ def inav(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with ExitStack() as stack:
         start = Starter(tmp_path_factory.mktemp("inav"), stack)
         board = start.board("--kind", "inav", tcp=True)
-        settings = start.directory / "config.toml"
-        settings.write_text('pass_through = "everything"\n')  # for Set WP over an open link
-        daemon = start.daemon(board.fc, options=("--config", str(settings)))
+        daemon = start.daemon(board.fc, config='pass_through = "everything"\n')  # for Set WP over an open link
         daemon.wait()
         yield Bench(board, daemon, stack)
         stats = board.stats()

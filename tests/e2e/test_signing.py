@@ -5,7 +5,6 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,12 +29,9 @@ class SignedBench:
         port = free_port()
         link = f"udpin:127.0.0.1:{port}"
         self.address = "127.0.0.1", port
-        config = start.directory / "naze-bridge.toml"
-        config.write_text(f'gcs = [{{address = "{link}", {guard}}}]\n')
+        config = f'gcs = [{{address = "{link}", {guard}}}]\n'
         self.board = start.board()
-        self.daemon: Daemon = start.daemon(
-            str(self.board.link), (link,), options=("--config", str(config), "--verbose")
-        )
+        self.daemon: Daemon = start.daemon(str(self.board.link), (link,), options=("--verbose",), config=config)
         self.daemon.wait()
 
     def station(self, key: bytes | None = None, host: str = "127.0.0.1", sysid: int = 250) -> PlainStation:
@@ -61,11 +57,8 @@ def stack() -> Iterator[ExitStack]:
 
 
 @pytest.fixture
-def keyed(start: Starter, stack: ExitStack, tmp_path: Path) -> SignedBench:
-    key_file = tmp_path / "gcs.key"
-    key_file.write_text(PASSPHRASE + "\n")
-    key_file.chmod(0o600)
-    return SignedBench(start, stack, f'key_file = "{key_file}"')
+def keyed(start: Starter, stack: ExitStack) -> SignedBench:
+    return SignedBench(start, stack, f'key_file = "{start.key_file(PASSPHRASE)}"')
 
 
 def signed(station: PlainStation, message: Any) -> bytes:

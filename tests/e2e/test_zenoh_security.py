@@ -2,56 +2,34 @@
 """The daemon in a fleet with authentication, using the unchanged examples, and attempts of strangers."""
 
 import datetime
-from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import pytest
 import trustme
 
 from payloads.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
-from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
-from tests.support.zenoh_bench import Reader, ask, ask_surely, body, key, write_config, zenoh_bench
+from tests.support.secured_fleet import Fleet
+from tests.support.zenoh_bench import Reader, ask, ask_surely, body, key, zenoh_bench, zenoh_config
+
+pytest_plugins = ("tests.support.secured_fixtures",)
 
 UPLOAD = f"{COMMANDS}/mission/upload"
 EXPIRED: dict[str, Any] = {"not_before": datetime.datetime(2020, 1, 1), "not_after": datetime.datetime(2021, 1, 1)}
 MISSION = plan_text(plain_plan(12)).encode()
 
 
-@pytest.fixture(scope="module")
-def stack() -> Iterator[ExitStack]:
-    with ExitStack() as stack:
-        yield stack
-
-
-@pytest.fixture(scope="module")
-def tls(stack: ExitStack, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
-    return tls_fleet(tmp_path_factory.mktemp("tls"), stack)
-
-
-@pytest.fixture(scope="module")
-def passwords(stack: ExitStack, tmp_path_factory: pytest.TempPathFactory) -> Fleet:
-    return password_fleet(tmp_path_factory.mktemp("passwords"), stack)
-
-
-@pytest.fixture(params=["tls", "passwords"])
-def fleet(request: pytest.FixtureRequest) -> Fleet:
-    found: Fleet = request.getfixturevalue(request.param)
-    return found
-
-
 def secured_bench(start: Starter, config: Path) -> Bench:
     return zenoh_bench(start, f'config_file = "{config}"\ncommands = true')
 
 
-def test_the_pilot_commands_and_a_guest_only_reads(start: Starter, fleet: Fleet) -> None:
-    bench = secured_bench(start, fleet.config("vehicle", "naze-1"))
-    with fleet.open("pilot", "pilot") as pilot, fleet.open("pilot", "guest") as guest:
+def test_the_pilot_commands_and_a_guest_only_reads(start: Starter, secured: Fleet) -> None:
+    bench = secured_bench(start, secured.config("vehicle", "naze-1"))
+    with secured.open("pilot", "pilot") as pilot, secured.open("pilot", "guest") as guest:
         ask_surely(pilot, UPLOAD, MISSION)
         assert bench.board.records() == records_of(judge(plain_plan(12)))
         reader = Reader(guest, key("telemetry/*"))
@@ -66,10 +44,10 @@ def test_the_pilot_commands_and_a_guest_only_reads(start: Starter, fleet: Fleet)
     bench.board.assert_unharmed()
 
 
-def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fleet) -> None:
+def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, secured: Fleet) -> None:
     """It has another vehicle's name, so the router denies it every key. The ground station notices nothing."""
-    bench = secured_bench(start, fleet.config("vehicle", "naze-2"))
-    with fleet.open("pilot", "pilot") as pilot:
+    bench = secured_bench(start, secured.config("vehicle", "naze-2"))
+    with secured.open("pilot", "pilot") as pilot:
         reader = Reader(pilot)
         until(lambda: (bench.daemon.status() or {}).get("zenoh_neighbours"), "the daemon in the fleet")
         planner = bench.mission_planner()
@@ -80,7 +58,7 @@ def test_a_vehicle_that_may_not_publish_keeps_working(start: Starter, fleet: Fle
     bench.board.assert_unharmed()
 
 
-def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, stack: ExitStack, tmp_path: Path) -> None:
+def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, fleet_stack: ExitStack, tmp_path: Path) -> None:
     own = trustme.CA.from_pem((tls.folder / "ca.pem").read_bytes(), (tls.folder / "ca.key").read_bytes())
     for name, issued in {
         "old": own.issue_cert("naze-1", common_name="naze-1", **EXPIRED),
@@ -93,8 +71,8 @@ def test_vehicles_with_invalid_certificates_report_it(tls: Fleet, stack: ExitSta
     daemons = {}
     for name in wrong:
         (tmp_path / name).mkdir()
-        config = write_config(tmp_path / name, f'config_file = "{tls.config("vehicle", name)}"')
-        daemons[name] = Starter(tmp_path / name, stack).daemon("sim:", options=("--config", str(config)))
+        config = zenoh_config(f'config_file = "{tls.config("vehicle", name)}"')
+        daemons[name] = Starter(tmp_path / name, fleet_stack).daemon("sim:", config=config)
     for name, reason in wrong.items():
         alone = until(partial(daemons[name].has_logged, "zenoh.alone"), "a log entry about the certificate")
         assert reason in alone["why"]

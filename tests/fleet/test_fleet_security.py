@@ -7,7 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -16,30 +16,10 @@ import trustme
 import zenoh
 
 from tests.support.programs import free_port, run_naze_bridge, until
-from tests.support.secured_fleet import Fleet, password_fleet, tls_fleet
+from tests.support.secured_fleet import Fleet
 from tests.support.zenoh_router import EXAMPLES, running_router
 
-
-@pytest.fixture(scope="module")
-def stack() -> Iterator[ExitStack]:
-    with ExitStack() as stack:
-        yield stack
-
-
-@pytest.fixture(scope="module")
-def tls(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
-    return tls_fleet(tmp_path_factory.mktemp("tls"), stack)
-
-
-@pytest.fixture(scope="module")
-def passwords(tmp_path_factory: pytest.TempPathFactory, stack: ExitStack) -> Fleet:
-    return password_fleet(tmp_path_factory.mktemp("passwords"), stack)
-
-
-@pytest.fixture(params=["tls", "passwords"])
-def secured(request: pytest.FixtureRequest) -> Fleet:
-    found: Fleet = request.getfixturevalue(request.param)
-    return found
+pytest_plugins = ("tests.support.secured_fixtures",)
 
 
 def fake_bridge(stack: ExitStack, session: zenoh.Session, vehicle: str) -> None:

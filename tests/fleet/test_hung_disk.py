@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from tests.attack.test_disk import DaemonWithoutDisk
-from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.fleet_bench import Fleet
 from tests.support.plan import judge, plain_plan, plan_text, records_of
-from tests.support.zenoh_bench import ask, write_config
+from tests.support.zenoh_bench import I_KNOW, ask, zenoh_config
 
 
 def test_a_vehicle_whose_disk_hangs_is_listed_and_takes_missions(tmp_path: Path) -> None:
@@ -16,8 +16,7 @@ def test_a_vehicle_whose_disk_hangs_is_listed_and_takes_missions(tmp_path: Path)
         fleet = Fleet(tmp_path, stack)
         board = fleet.board("kite")
         table = f'connect = ["{fleet.router.endpoint}"]\n{I_KNOW}'
-        config = write_config(tmp_path / "kite", table, "kite")
-        kite = DaemonWithoutDisk(tmp_path / "kite", board.fc, options=("--config", str(config)))
+        kite = DaemonWithoutDisk(tmp_path / "kite", board.fc, config=zenoh_config(table, "kite"))
         stack.callback(kite.end, signal.SIGKILL)
         fleet.wait("kite")
         file = tmp_path / "plan.waypoints"

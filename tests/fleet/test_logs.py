@@ -12,8 +12,9 @@ import pytest
 
 from fleet.logs import Log, fetch_log
 from service.recording.tlog_recorder import TLOG_FOLDER
-from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.fleet_bench import Fleet
 from tests.support.programs import Program, until
+from tests.support.zenoh_bench import I_KNOW
 
 NAME = "2026-05-01 10-00-00 flight.tlog"
 #: Half of it cannot be compressed.

@@ -18,10 +18,10 @@ import pytest
 from fleet.roll_call import roll_call
 from fleet.session import FleetError
 from payloads.keys import UPLOAD
-from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.fleet_bench import Fleet
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import NAZE_BRIDGE, TIMEOUT_S, until
-from tests.support.zenoh_bench import ask_surely
+from tests.support.zenoh_bench import I_KNOW, ask_surely
 
 #: At this speed 146 records take seconds, enough time to inject a fault.
 _SLOW_BAUD = 9600

@@ -38,9 +38,7 @@ def shared_inav(tmp_path: Path) -> Iterator[SharedInav]:
         start = Starter(tmp_path, stack)
         fc = os.environ.get("INAV_FC") or start.board("--kind", "inav", tcp=True).fc
         share = f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-        config = tmp_path / "share.toml"
-        config.write_text(f'[[share]]\naddress = "tcpin:{share}"\nwrite = true\n')
-        daemon = start.daemon(fc, options=("--config", str(config)))
+        daemon = start.daemon(fc, config=f'[[share]]\naddress = "tcpin:{share}"\nwrite = true\n')
         daemon.wait()
         planner = stack.enter_context(MissionPlanner(daemon.address))
         planner.connect()

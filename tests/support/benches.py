@@ -47,18 +47,30 @@ class Starter:
         return board
 
     def daemon(
-        self, fc: str, gcs: Sequence[str] = (), state_dir: Path | None = None, options: Sequence[str] = ()
+        self,
+        fc: str,
+        gcs: Sequence[str] = (),
+        state_dir: Path | None = None,
+        options: Sequence[str] = (),
+        config: str = "",
     ) -> Daemon:
-        return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir, options))
+        return self._ended_at_last(Daemon(self.directory, fc, gcs, state_dir, options, config))
+
+    def key_file(self, words: str = "loop the loop") -> Path:
+        """A file with a key for signing, which only its owner may read."""
+        path = self.directory / "gcs.key"
+        path.write_text(f"{words}\n")
+        path.chmod(0o600)
+        return path
 
     def program(self, name: str, *arguments: str) -> Program:
         """Start another subcommand; its output goes to a file of that name."""
         return self._ended_at_last(Program(self.directory / name, *arguments))
 
-    def bench(self, *options: str, gcs: Sequence[str] = (), daemon_options: Sequence[str] = ()) -> Bench:
+    def bench(self, *options: str, gcs: Sequence[str] = (), config: str = "") -> Bench:
         """A board with `options`, and a daemon that has found it."""
         board = self.board(*options)
-        daemon = self.daemon(str(board.link), gcs, options=daemon_options)
+        daemon = self.daemon(str(board.link), gcs, config=config)
         daemon.wait()
         return Bench(board, daemon, self._stack)
 

@@ -13,9 +13,9 @@ from typing import Any
 from fleet.roll_call import roll_call
 from fleet.session import open_session
 from tests.support.programs import Board, Daemon, run_naze_bridge, until
+from tests.support.zenoh_bench import I_KNOW, zenoh_config
 from tests.support.zenoh_router import Router, running_router
 
-I_KNOW = 'commands = true\ncommands_without_authentication = "I know"\n'
 Vehicle = dict[str, Any]
 
 
@@ -43,11 +43,8 @@ class Fleet:
         """Start a vehicle; `name` if it differs from its folder's."""
         own = self.folder / folder
         own.mkdir(exist_ok=True)
-        config = own / "config.toml"
-        config.write_text(
-            f'sysid = {sysid}\n[zenoh]\nvehicle = "{name or folder}"\nconnect = ["{self.router.endpoint}"]\n' + commands
-        )
-        daemon = Daemon(own, fc, options=("--config", str(config)))
+        table = zenoh_config(f'connect = ["{self.router.endpoint}"]\n{commands}', name or folder)
+        daemon = Daemon(own, fc, config=f"sysid = {sysid}\n{table}")
         self._stack.callback(daemon.end, signal.SIGKILL)
         self.daemons[folder] = daemon
         return daemon

@@ -176,7 +176,7 @@ class Board(Program):
 
 
 class Daemon(Program):
-    """`naze-bridge run`. Without `gcs` it listens for UDP on a free port, `port`."""
+    """`naze-bridge run`. Without `gcs` it listens for UDP on a free port, `port`. config: the text of its file."""
 
     def __init__(
         self,
@@ -185,12 +185,16 @@ class Daemon(Program):
         gcs: Sequence[str] = (),
         state_dir: Path | None = None,
         options: Sequence[str] = (),
+        config: str = "",
     ) -> None:
         self.port = 0 if gcs else free_port()
         self.state_dir = state_dir or directory / "state"
         links = [word for link in gcs or (f"udpin:127.0.0.1:{self.port}",) for word in ("--gcs", link)]
-        state = ("--state-dir", str(self.state_dir))
-        super().__init__(directory / "daemon.log", "run", "--fc", fc, *links, *state, *options)
+        files = ["--state-dir", str(self.state_dir)]
+        if config:
+            (directory / "config.toml").write_text(config)
+            files += ["--config", str(directory / "config.toml")]
+        super().__init__(directory / "daemon.log", "run", "--fc", fc, *links, *files, *options)
 
     @property
     def address(self) -> tuple[str, int]:

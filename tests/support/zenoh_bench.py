@@ -5,7 +5,6 @@ import json
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import zenoh
@@ -23,17 +22,15 @@ def endpoint() -> str:
     return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
 
 
-def write_config(directory: Path, table: str, vehicle: str = VEHICLE, name: str = "config.toml") -> Path:
-    path = directory / name
+def zenoh_config(table: str, vehicle: str = VEHICLE) -> str:
+    """The text of a configuration with this table."""
     name_line = f'vehicle = "{vehicle}"\n' if vehicle else ""
-    path.write_text(f"[zenoh]\n{name_line}{table}\n")
-    return path
+    return f"[zenoh]\n{name_line}{table}\n"
 
 
 def zenoh_bench(start: Starter, table: str, *board_options: str) -> Bench:
     """A daemon that has found a simulated board and has `table` as its [zenoh]."""
-    config = write_config(start.directory, table)
-    return start.bench(*board_options, daemon_options=("--config", str(config)))
+    return start.bench(*board_options, config=zenoh_config(table))
 
 
 @contextmanager

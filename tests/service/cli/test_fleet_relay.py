@@ -5,10 +5,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from tests.service.cli.test_vehicle_relay import relay
-from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.fleet_bench import Fleet
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import judge, plain_plan, records_of
 from tests.support.programs import free_port, until
+from tests.support.zenoh_bench import I_KNOW
 
 _COMMANDS = I_KNOW + "mavlink_in = true\n"
 

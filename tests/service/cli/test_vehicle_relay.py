@@ -11,10 +11,11 @@ from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawResult
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
-from tests.support.fleet_bench import I_KNOW, Fleet
+from tests.support.fleet_bench import Fleet
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
 from tests.support.programs import Program, free_port, until
+from tests.support.zenoh_bench import I_KNOW
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import pytest
 
 from service.settings.key import SettingsError
 from service.settings.load import load_settings
-from tests.support.zenoh_bench import write_config
+from tests.support.zenoh_bench import zenoh_config
 
 SETTINGS_THAT_END_IT = {
     "a missing configuration": ('config_file = "nothing.json5"', None, "No such file"),
@@ -47,7 +47,8 @@ def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name:
     table, zenoh_file, reason = SETTINGS_THAT_END_IT[name]
     if zenoh_file is not None:
         (tmp_path / "zenoh.json5").write_text(zenoh_file)
-    config = write_config(tmp_path, table, vehicle="")
+    config = tmp_path / "config.toml"
+    config.write_text(zenoh_config(table, vehicle=""))
     with pytest.raises(SettingsError) as caught:
         load_settings(config, fc="sim:", state_dir=tmp_path)
     (problem,) = caught.value.problems
@@ -60,7 +61,8 @@ def test_invalid_settings_stop_the_start_with_one_sentence(tmp_path: Path, name:
 def test_the_examples_count_as_authentication(tmp_path: Path, of: str) -> None:
     """With authentication, "I know" is not needed."""
     example = Path(__file__).parents[3] / "examples" / of / "vehicle.json5"
-    config = write_config(tmp_path, f'config_file = "{example}"\ncommands = true\nmavlink_in = true')
+    config = tmp_path / "config.toml"
+    config.write_text(zenoh_config(f'config_file = "{example}"\ncommands = true\nmavlink_in = true'))
     settings = load_settings(config, fc="sim:", state_dir=tmp_path)
     assert settings.zenoh is not None
     assert (settings.zenoh.commands, settings.zenoh.mavlink_in) == (True, True)

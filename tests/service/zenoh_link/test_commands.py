@@ -15,7 +15,7 @@ from payloads.keys import COMMANDS
 from tests.support.benches import Bench, Starter
 from tests.support.plan import judge, plain_plan, plan_text, records_of
 from tests.support.programs import until
-from tests.support.zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, write_config, zenoh_bench
+from tests.support.zenoh_bench import I_KNOW, ask, ask_surely, endpoint, key, session, zenoh_bench, zenoh_config
 
 UPLOAD, CHECK, CLEAR, STATUS = (
     f"{COMMANDS}/{each}" for each in ("mission/upload", "mission/check", "mission/clear", "status")
@@ -184,8 +184,7 @@ def test_commands_are_off_by_default(start: Starter) -> None:
 
 def test_a_command_without_a_flight_controller_is_an_error(start: Starter, tmp_path: Path) -> None:
     where = endpoint()
-    config = write_config(tmp_path, f'listen = ["{where}"]\n{I_KNOW}')
-    daemon = start.daemon(str(tmp_path / "nothing"), options=("--config", str(config)))
+    daemon = start.daemon(str(tmp_path / "nothing"), config=zenoh_config(f'listen = ["{where}"]\n{I_KNOW}'))
     daemon.wait_up()
     with session(connect=where) as opened:
         state = ask_surely(opened, "state")

@@ -12,7 +12,7 @@ from payloads.keys import COMMANDS
 from tests.support.benches import Starter
 from tests.support.plan import plain_plan, plan_text
 from tests.support.programs import until
-from tests.support.zenoh_bench import I_KNOW, VEHICLE, Reader, ask, endpoint, session, write_config, zenoh_bench
+from tests.support.zenoh_bench import I_KNOW, VEHICLE, Reader, ask, endpoint, session, zenoh_bench, zenoh_config
 from tests.support.zenoh_router import running_router
 
 
@@ -30,8 +30,7 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
         before = first.board.records()
         second_directory = tmp_path / "second"
         second_directory.mkdir()
-        config = write_config(second_directory, f'connect = ["{where}"]')
-        second = Starter(second_directory, stack).daemon("sim:", options=("--config", str(config)))
+        second = Starter(second_directory, stack).daemon("sim:", config=zenoh_config(f'connect = ["{where}"]'))
         for daemon in (first.daemon, second):
             taken = until(partial(daemon.has_logged, "zenoh.name_taken"), "a log entry about the other vehicle")
             assert taken["vehicle"] == VEHICLE
