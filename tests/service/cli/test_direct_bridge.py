@@ -3,7 +3,6 @@
 
 import json
 import pwd
-import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from service.cli.main import main
+from tests.service.cli.test_mission_commands import assert_one_sentence
 from tests.support.benches import Starter
 from tests.support.programs import Board, run_naze_bridge
 
@@ -20,13 +20,6 @@ from tests.support.programs import Board, run_naze_bridge
 def board(tmp_path: Path) -> Iterator[Board]:
     with ExitStack() as stack:
         yield Starter(tmp_path, stack).board()
-
-
-def assert_one_sentence(ended: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:
-    assert ended.returncode == code, ended
-    (sentence,) = ended.stderr.splitlines()
-    assert sentence.startswith("naze-bridge: ")
-    assert not [part for part in parts if part not in sentence], sentence
 
 
 def test_status_waits_for_telemetry(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.service.cli.test_direct_bridge import assert_one_sentence
+from tests.service.cli.test_mission_commands import assert_one_sentence
 from tests.support.programs import run_naze_bridge
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -31,7 +31,7 @@ from service.links.gcs_links import open_link
 from service.settings.addresses import parse_fc, parse_gcs
 from service.settings.write_access import read_passphrase
 from terminal import files
-from tests.service.cli.test_direct_bridge import assert_one_sentence
+from tests.service.cli.test_mission_commands import assert_one_sentence
 from tests.support.faulty_machine import FaultyMachine
 from tests.support.machine_faults import MACHINE, OTHERS, Faulty, Make, Trial
 from tests.support.programs import free_port, run_naze_bridge

@@ -44,13 +44,6 @@ def test_start_search_and_stop_are_logged(start: Starter, number: signal.Signals
     assert not [event for event in events if event["event"] in LOSSES]
 
 
-def test_an_unplugged_port_is_reported_lost(start: Starter) -> None:
-    bench = start.bench()
-    bench.board.set("unplug")
-    lost = until(lambda: bench.daemon.has_logged("fc.port_lost"), "the loss")
-    assert lost["level"] == "warning"
-
-
 def test_an_unread_log_does_not_stop_the_daemon(tmp_path: Path) -> None:
     """As with `naze-bridge run 2>&1 | less`, or a stalled journal: the pipe is full before the first line."""
     unread, full = os.pipe()

@@ -103,7 +103,11 @@ def test_a_failed_start_is_never_ready(start: Starter, systemd: Systemd) -> None
     link = f"udpin:127.0.0.1:{first.port}"
     ended = run_naze_bridge("run", "--fc", "sim:", "--gcs", link, "--state-dir", start.directory / "other")
     assert ended.returncode == 1
+    (sentence,) = [line for line in ended.stderr.splitlines() if not line.startswith("{")]
+    assert sentence.startswith(f"naze-bridge: {link}")
+    assert "in use" in sentence
     assert "READY=1" not in systemd.listen()
+    assert first.is_alive
 
 
 def test_a_service_manager_in_the_abstract_namespace_is_notified(tmp_path: Path) -> None:

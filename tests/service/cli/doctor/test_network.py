@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The network: Wi-Fi without address, occupied ports."""
 
-import os
-
 from service.cli.doctor.checked import Checked
 from service.cli.doctor.network import check_keys, check_ports
 from service.settings import Settings
@@ -24,14 +22,6 @@ def ports(
 ) -> list[Checked]:
     settings = Settings(PORT, [parse_gcs(link)])
     return list(check_ports(pi, settings, is_running=is_running, ask=lambda *_: rules))
-
-
-def test_an_occupied_network_port_is_a_problem(pi: FaultyMachine) -> None:
-    pi.sockets(udp=UDP_14550)
-    remedy = "restart the Pi" if os.geteuid() == 0 else "with sudo"
-    assert_problem(ports(pi), "UDP port 14550 is used by ", remedy)
-    pi.runs(55, "/usr/bin/python3", "-u", "/usr/local/bin/mavproxy.py", has_open="socket:[4711]")
-    assert_problem(ports(pi), "mavproxy.py (pid 55)", "sudo kill 55")
 
 
 def test_a_network_port_used_by_our_daemon_is_fine(pi: FaultyMachine) -> None:

@@ -78,16 +78,6 @@ def test_a_kernel_console_is_a_problem(pi: FaultyMachine, word: str) -> None:
     )
 
 
-def test_a_kernel_console_outside_cmdline_txt_is_found(pi: FaultyMachine) -> None:
-    pi.write("/proc/cmdline", "root=/dev/sda1 console=ttyAMA0,9600\n")
-    # Setup has removed it from cmdline.txt already, or the firmware replaced "serial0".
-    assert_problem(
-        check_console(pi, PORT), "started with console=ttyAMA0,9600", "sudo naze-bridge setup && sudo reboot"
-    )
-    pi.path("/boot/firmware/cmdline.txt").unlink()
-    assert_problem(check_console(pi, PORT), "started with console=ttyAMA0,9600", "boot loader's command line")
-
-
 def test_a_console_on_another_port_is_fine(pi: FaultyMachine) -> None:
     pi.runs(412, "/sbin/agetty", "ttyAMA10")
     pi.write("/proc/cmdline", "console=ttyAMA10,115200 console=tty1")

@@ -112,16 +112,6 @@ def test_a_weak_key_is_used_with_a_warning(pi: Pi, tmp_path: Path) -> None:
     assert "the key is weak" in pi.setup("--yes").output
 
 
-def test_an_empty_key_and_two_keys_are_refused(pi: Pi, tmp_path: Path) -> None:
-    file = tmp_path / "key"
-    file.write_text("\n")
-    for options in (["--key-file", str(file)], ["--key-file", str(file), "--new-key"]):
-        assert pi.setup("--yes", *options).exit_code == 2
-    file.write_text("x\n")
-    assert "cannot be used together" in pi.setup("--yes", "--key-file", str(file), "--new-key").output
-    assert not pi.key_file.exists()
-
-
 @pytest.mark.parametrize(
     "password",
     [

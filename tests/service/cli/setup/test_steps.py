@@ -12,7 +12,6 @@ from service.cli.setup.change import Machine, Run, Step, WriteFile
 from service.cli.setup.hotspot import hotspot_name
 from service.cli.setup.steps import missing_steps
 from tests.support.faulty_machine import FaultyMachine
-from tests.support.programs import run_naze_bridge
 
 #: Model, target of /dev/serial0, the console's name in Raspberry Pi OS, and the line needed in config.txt.
 MODELS = {
@@ -166,22 +165,3 @@ def test_setup_of_an_image_for_every_model_does_not_start_services(tmp_path: Pat
     (uart,) = [change for step in steps for change in step.changes if change.describe().endswith("config.txt")]
     assert isinstance(uart, WriteFile)
     assert uart.text.endswith("[all]\n# naze-bridge: the UART on GPIO 14 and 15\nenable_uart=1\ndtparam=uart0=on\n")
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--hotspot", "naze"], "a hotspot needs a password"),
-        (["--hotspot", "n" * 33, "--password-file", "{}"], "is not a network name"),
-        (["--country", "germany"], "is not a country code"),
-        (["--name", "my pi"], "is not a host name"),
-        (["--name", "kite.local"], "is not a host name"),
-        (["--fc", "naze"], "is not a flight controller connection"),
-    ],
-)
-def test_an_invalid_answer_is_reported_in_one_sentence(tmp_path: Path, options: list[str], words: str) -> None:
-    file = tmp_path / "password"
-    file.write_text("long-enough\n")
-    ended = run_naze_bridge("setup", "--yes", "--root", tmp_path, *(option.format(file) for option in options))
-    assert ended.returncode == 2
-    assert words in ended.stderr
