@@ -392,4 +392,8 @@ class Meter:
         return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
 
     def descriptors(self) -> list[str]:
-        return sorted(os.readlink(entry) for entry in (self._folder / "fd").iterdir())
+        found = []
+        for entry in (self._folder / "fd").iterdir():
+            with suppress(FileNotFoundError):  # closed meanwhile
+                found.append(os.readlink(entry))
+        return sorted(found)
