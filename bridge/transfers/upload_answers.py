@@ -21,6 +21,7 @@ _CANCEL_S = 3.0
 #: begin the next transfer, whose end a stale ack would be.
 _NEVER_ASK = Kind.QGROUNDCONTROL, Kind.MAVSDK
 _ACK_AGAIN_S = (0.02, 0.04, 0.06)
+_ACK_LATE_S = 0.02
 #: An item that arrives sooner after the final ack was sent before it, and does not show that it was lost.
 _CROSSING_S = 0.4
 _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, sentences.NOT_WHOLE())
@@ -96,13 +97,13 @@ class UploadAnswers:
         if now < self.due:
             return
         # A station may have left, or begun another upload.
-        self._again = [each for each in self._again if self._memory(each[0]).final_ack is each[1]]
+        self._again = [each for each in self._again if each[1].again and self._memory(each[0]).final_ack is each[1]]
         for sender, answer in self._again:
-            if answer.again and now >= answer.again[0]:
-                sender.mission_ack(answer.ack, self._mission_type)
+            if now >= answer.again[0]:
+                if now < answer.again[0] + _ACK_LATE_S:
+                    sender.mission_ack(answer.ack, self._mission_type)
                 answer.again = answer.again[1:]
-        self._again = [each for each in self._again if each[1].again]
-        self.due = min((answer.again[0] for _, answer in self._again), default=inf)
+        self.due = min((answer.again[0] for _, answer in self._again if answer.again), default=inf)
 
     # After the end.
 
@@ -116,8 +117,7 @@ class UploadAnswers:
 
     def late_item(self, sender: Sender, seq: int, now: float) -> None:
         """Answer an item of an upload that has ended."""
-        answer = self._last(sender, now)
-        if answer is not None:
+        if (answer := self._last(sender, now)) is not None:
             has_missed_it = seq == answer.count - 1 and now >= answer.sent_at + _CROSSING_S
             if answer.is_refusal or has_missed_it:
                 sender.mission_ack(answer.ack, self._mission_type)

@@ -82,6 +82,17 @@ def test_the_final_ack_is_repeated_before_the_station_can_go_on() -> None:
     assert again[-1] < first + 0.1
 
 
+def test_a_final_ack_that_a_busy_machine_delays_is_not_repeated() -> None:
+    """It could reach the station during its next transfer."""
+    world, station = holding()
+    station.send(QGC_HEARTBEAT)
+    receiving(world, station, waypoints(8), 8)
+    world.wait_until(lambda _: bool(acks(station)), 3)
+    world.now += 0.2
+    world.run(1)
+    assert len([message for _, message in station.received if message.get_type() == "MISSION_ACK"]) == 1
+
+
 @pytest.mark.parametrize("next_message", [list_message(), count_message(5), ack_message(A.ACCEPTED)])
 def test_a_station_that_continues_gets_a_single_final_ack(next_message: Message) -> None:
     world, station = holding()
