@@ -41,6 +41,16 @@ def receiving(world: World, station: GroundStation, items: list[MissionItem], se
     station.take()
 
 
+def finish(world: World, station: GroundStation, items: list[MissionItem], sent: int = 0) -> None:
+    """Send the items from number `sent` on; the list is accepted and stored."""
+    before = acks(station)
+    for seq in range(sent, len(items)):
+        station.send(item_message(seq, items[seq]))
+    world.run(1)
+    assert acks(station) == [*before, A.ACCEPTED]
+    assert world.stored == records_of(items)
+
+
 def acks(station: GroundStation) -> list[MissionResult]:
     return [MissionResult(message.type) for message in station.messages("MISSION_ACK")]
 

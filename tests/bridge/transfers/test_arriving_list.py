@@ -11,8 +11,26 @@ from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
-from tests.support.upload_bench import A, acks, holding, receiving, requested, state
+from tests.support.upload_bench import A, acks, finish, holding, receiving, requested, state
 from tests.support.world import GroundStation, Radio, World
+
+
+def another(count: int) -> list[MissionItem]:
+    """A list with the home of `waypoints(count, 1)`."""
+    return [*waypoints(1, 1), *waypoints(count, 2)[1:]]
+
+
+def assert_written_on_request(world: World, station: GroundStation, items: list[MissionItem]) -> None:
+    """From now on the station answers each request with an item of this list, as MAVProxy and QGroundControl do."""
+
+    def answer(message: Message) -> None:
+        if message.get_type() == "MISSION_REQUEST":
+            station.send(item_message(message.seq, items[message.seq]))
+
+    station.on_message[:] = [answer]
+    world.wait_until(lambda _: bool(acks(station)), 20)
+    assert acks(station) == [A.ACCEPTED]
+    assert world.stored == records_of(items)
 
 
 def test_two_lists_are_never_mixed_if_a_burst_loses_the_first_item() -> None:
@@ -25,11 +43,7 @@ def test_two_lists_are_never_mixed_if_a_burst_loses_the_first_item() -> None:
         station.send(item_message(seq, after[seq]))
     world.run(0.5)
     assert requested(station)[-1] == 0
-    for seq in range(12):
-        station.send(item_message(seq, after[seq]))
-    world.run(2)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(after)
+    finish(world, station, after)
 
 
 @pytest.mark.parametrize("answered", [8, 18])
@@ -41,16 +55,15 @@ def test_two_lists_are_never_mixed_if_a_request_is_on_the_way(repeat: float, ans
     former = Upload(station, waypoints(20, 1))
     world.wait_until(lambda _: answered in former.requested, 10)
     former.stop()
-    items = [*waypoints(1, 1), *waypoints(20, 2)[1:]]
-    assert Upload(station, items).run() is A.ACCEPTED
-    assert world.stored == records_of(items)
+    assert Upload(station, another(20)).run() is A.ACCEPTED
+    assert world.stored == records_of(another(20))
 
 
 @pytest.mark.parametrize("count", [9, 16])
 def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) -> None:
     """MAVProxy had answered two requests for item 2, and both answers arrive after its next MISSION_COUNT."""
     world, station = holding()
-    former, items = waypoints(16, 1), [*waypoints(1, 1), *waypoints(count, 2)[1:]]
+    former, items = waypoints(16, 1), another(count)
     receiving(world, station, former, 2)
     late = [station.pack(item_message(2, former[2])) for _ in range(2)]
     station.radio = Radio(delay_s=0.02)
@@ -65,7 +78,7 @@ def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) ->
 def test_two_lists_are_never_mixed_if_a_request_and_the_repeat_are_on_their_way() -> None:
     """MAVProxy answers both with its new list's last item."""
     world, station = holding()
-    former, items = waypoints(5, 1), [*waypoints(1, 1), *waypoints(5, 2)[1:]]
+    former, items = waypoints(5, 1), another(5)
     receiving(world, station, former, 4)
     world.wait_until(lambda _: 4 in requested(station), 2)
     station.send(count_message(5))
@@ -73,10 +86,7 @@ def test_two_lists_are_never_mixed_if_a_request_and_the_repeat_are_on_their_way(
         station.send(item_message(4, items[4]))
         world.run(0.01)
         assert state(world) is not Delivering
-    answers_requests(world, station, items)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
+    assert_written_on_request(world, station, items)
 
 
 def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
@@ -88,22 +98,7 @@ def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
         station.send(item_message(seq, item))
     world.run(0.001)
     assert acks(station) == []
-    for seq in range(5):
-        world.wait_until(lambda _, seq=seq: seq in requested(station), 2)  # type: ignore[misc]
-        station.send(item_message(seq, items[seq]))
-    world.wait_until(lambda _: bool(acks(station)), 5)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
-
-
-def answers_requests(world: World, station: GroundStation, items: list[MissionItem]) -> None:
-    """From now on the station answers each request with an item of this list, as MAVProxy and QGroundControl do."""
-
-    def answer(message: Message) -> None:
-        if message.get_type() == "MISSION_REQUEST":
-            station.send(item_message(message.seq, items[message.seq]))
-
-    station.on_message[:] = [answer]
+    assert_written_on_request(world, station, items)
 
 
 @pytest.mark.parametrize("changed", [range(1, 12), range(3, 4), range(9, 10)])
@@ -115,10 +110,7 @@ def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_i
     receiving(world, station, former, 6)
     world.run(3.0)
     station.pack(count_message(12))
-    answers_requests(world, station, latter)
-    world.wait_until(lambda _: bool(acks(station)), 20)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(latter)
+    assert_written_on_request(world, station, latter)
 
 
 def test_a_list_is_requested_twice_if_a_frame_was_lost() -> None:
@@ -147,16 +139,13 @@ def test_mission_planner_is_not_asked_for_its_items_again_after_a_lost_frame() -
     station.send(item_message(4, items[4]))
     world.run(0.001)
     assert requested(station) == [4, 4, 4, 5]
-    station.send(item_message(5, items[5]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
+    finish(world, station, items, 5)
 
 
 def test_a_list_whose_last_item_follows_a_lost_frame_is_requested_again() -> None:
     """MAVProxy does not answer after its last item: its list is not accepted."""
     world, station = holding()
-    first, second = waypoints(6, 1), [*waypoints(1, 1), *waypoints(6, 2)[1:]]
+    first, second = waypoints(6, 1), another(6)
     receiving(world, station, first, 5)
     station.pack(count_message(6))
     station.send(item_message(5, second[5]))
@@ -172,17 +161,13 @@ def test_a_delayed_message_count_does_not_begin_the_list_again() -> None:
     late = station.pack(count_message(6))
     receiving(world, station, items, 3)
     world.receive_from(station, late)
-    for seq in range(3, 6):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
+    finish(world, station, items, 3)
 
 
 def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
     """MAVProxy sends it once, and answers the previous list's repeated request with its present list's item."""
     world, station = holding()
-    former, items = waypoints(9, 1), [*waypoints(1, 1), *waypoints(9, 2)[1:]]
+    former, items = waypoints(9, 1), another(9)
     receiving(world, station, former, 4)
     station.radio = Radio(loss=1.0)
     upload = Upload(station, items, tries=0)
@@ -244,23 +229,15 @@ def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
         station.send(item_message(seq, items[seq]))
         world.run(0.001)
         assert requested(station) == [5]
-    for seq in range(5, 8):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert world.stored == records_of(items)
+    finish(world, station, items, 5)
 
 
 def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
     world, station = holding()
     items = waypoints(40)
     station.radio = Radio(repeat=0.1, delay_s=0.03, spread_s=0.02)
-
-    def answer(message: Message) -> None:
-        if message.get_type() == "MISSION_REQUEST":
-            station.send(item_message(message.seq, items[message.seq]))
-
-    station.on_message.append(answer)
-    station.send(count_message(len(items)))
+    upload = Upload(station, items, repeat_s=20)
+    assert upload.run() is A.ACCEPTED
     world.run(10)
     assert world.stored == records_of(items)
     # Frames that overtake one another may look lost, then the list is read twice. If each duplicate caused another
@@ -277,7 +254,4 @@ def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continu
         station.send(item_message(seq, items[0]))
         world.run(0.001)
         assert acks(station) == [A.INVALID_SEQUENCE]
-    for seq in range(3, 8):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert acks(station)[-1] is A.ACCEPTED
+    finish(world, station, items, 3)

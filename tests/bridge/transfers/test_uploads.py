@@ -12,6 +12,7 @@ from bridge.model.missions import Outcome
 from bridge.transfers.upload_states import Asking, Delivering
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, Frame, MissionItem, MissionResult
+from protocols.msp.mission import WpRecord
 from simulator.board.options import SimOptions
 from tests.support.conversations import (
     MISSION,
@@ -33,6 +34,7 @@ from tests.support.upload_bench import (
     A,
     acks,
     assert_refusal_is_repeated,
+    finish,
     hanging_push,
     holding,
     partial_list_message,
@@ -54,21 +56,14 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         item_message(0, OLD[0], mission_type=mission_type),
         item_message(0, OLD[0], mission_type=mission_type, as_int=False),
         partial_list_message(mission_type),
+        *([clear_message(mission_type)] if mission_type != 255 else []),
     ):
         station.take()
         station.send(message)
         world.run(0.3)
-        assert [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")] == [
-            (A.UNSUPPORTED, mission_type)
-        ]
+        answers = [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")]
+        assert answers == [(A.UNSUPPORTED, mission_type)]
         assert requested(station) == []
-    if mission_type != 255:
-        station.take()
-        station.send(clear_message(mission_type))
-        world.run(0.3)
-        assert [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")] == [
-            (A.UNSUPPORTED, mission_type)
-        ]
     assert world.stored == OLD_RECORDS
 
 
@@ -106,18 +101,22 @@ def test_arming_while_items_arrive_denies_the_upload() -> None:
     assert world.store.outcomes()[-1] is Outcome.REJECTED
 
 
+def listen_for_acks(world: World, station: GroundStation) -> list[tuple[WpRecord, ...]]:
+    """What the board holds at each ack from now on."""
+    stored: list[tuple[WpRecord, ...]] = []
+    station.on_message.append(
+        lambda message: stored.append(world.stored) if message.get_type() == "MISSION_ACK" else None
+    )
+    return stored
+
+
 @pytest.mark.parametrize("message", [count_message(0), clear_message(), clear_message(255)])
 def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     world, station = holding()
-    stored_at_ack = []
-    station.on_message.append(
-        lambda message: stored_at_ack.append(world.stored) if message.get_type() == "MISSION_ACK" else None
-    )
+    stored_at_ack = listen_for_acks(world, station)
     station.send(message)
     world.wait_until(lambda _: bool(acks(station)), 2)
-    assert acks(station) == [A.ACCEPTED]
     assert stored_at_ack == [()]
-    assert world.naze.counters.flash_writes == 2
     # The second time nothing is written.
     station.send(message)
     world.run(1)
@@ -212,12 +211,18 @@ def test_only_some_cancelled_lists_are_stored() -> None:
     assert 10 < len(world.store.missions) <= 25
 
 
-def test_the_upload_of_a_station_that_disconnects_ends_at_once() -> None:
+@pytest.mark.parametrize(("sent", "stored"), [(20, OLD_RECORDS), (60, records_of(waypoints(60)))])
+def test_the_upload_of_a_station_that_disconnects_ends_before_the_write(
+    sent: int, stored: tuple[WpRecord, ...]
+) -> None:
     world, station = holding()
-    receiving(world, station, waypoints(60), 20)
+    receiving(world, station, waypoints(60), sent)
     world.bridge.gcs_gone(station.peer, world.now)
-    assert state(world) is None
-    assert world.stored == OLD_RECORDS
+    assert state(world) is (Delivering if sent == 60 else None)
+    world.run(3)
+    assert acks(station) == [A.OPERATION_CANCELLED] * (sent < 60)
+    assert world.stored == stored
+    assert world.inside.ground.station(station.peer) is None
 
 
 def test_a_list_announced_again_before_the_write_is_received_again() -> None:
@@ -232,27 +237,6 @@ def test_a_list_announced_again_before_the_write_is_received_again() -> None:
     world.run(8)
     assert A.ACCEPTED not in acks(station)
     assert world.stored != records_of(waypoints(8))
-
-
-def test_a_late_error_ack_does_not_end_a_write() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(60), 60)
-    assert state(world) is Delivering
-    station.send(ack_message(A.ERROR))
-    world.run(3)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(waypoints(60))
-
-
-def test_a_station_that_disconnects_before_the_ack_is_forgotten() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(60), 60)
-    assert state(world) is Delivering
-    world.bridge.gcs_gone(station.peer, world.now)
-    world.run(3)
-    assert acks(station) == []
-    assert world.stored == records_of(waypoints(60))
-    assert world.inside.ground.station(station.peer) is None
 
 
 def test_a_complete_list_that_waits_too_long_is_denied() -> None:
@@ -278,11 +262,7 @@ def test_a_waiting_upload_can_be_cancelled(message: Message) -> None:
     second.send(message)
     world.run(0.1)
     assert acks(second) == [A.OPERATION_CANCELLED]
-    for seq in range(3, 8):
-        station.send(item_message(seq, waypoints(8)[seq]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(waypoints(8))
+    finish(world, station, waypoints(8), 3)
 
 
 @pytest.mark.parametrize(("sent", "count"), [(0, 30), (1, 7), (10, 60), (29, 30)])
@@ -439,16 +419,61 @@ def test_a_new_upload_ends_the_reminders() -> None:
     assert station.texts() == []
 
 
-def test_a_delayed_item_still_counts() -> None:
+PLAN = waypoints(8)
+WRITTEN = records_of(PLAN)
+REFUSALS = [ack_message(result) for result in (A.ERROR, A.DENIED, A.OPERATION_CANCELLED, A.INVALID)]
+
+
+@pytest.mark.parametrize(
+    ("sent", "message", "answer", "stored"),
+    [
+        *((sent, refusal, A.OPERATION_CANCELLED, OLD_RECORDS) for sent in (0, 4) for refusal in REFUSALS),
+        (8, ack_message(A.ERROR), A.ACCEPTED, WRITTEN),
+        *((sent, clear_message(), A.ACCEPTED, ()) for sent in (0, 4, 8)),
+    ],
+)
+def test_a_station_cancels_or_clears_in_the_middle(
+    sent: int, message: Message, answer: MissionResult, stored: tuple[WpRecord, ...]
+) -> None:
     world, station = holding()
-    items = waypoints(35)
-    receiving(world, station, items, 34)
+    receiving(world, station, PLAN, sent)
+    station.send(message)
+    world.run(3)
+    assert acks(station)[-1] is answer
+    assert stored == () or len(acks(station)) == 1
+    assert (state(world), world.stored) == (None, stored)
+
+
+@pytest.mark.parametrize("sent", [0, 7])
+def test_a_late_ack_of_a_download_does_not_end_the_upload(sent: int) -> None:
+    """Mission Planner ends a Read with MISSION_ACK, which the network may delay, and *Write Fast* with another."""
+    world, station = holding()
+    receiving(world, station, PLAN, sent)
     station.send(ack_message(A.ACCEPTED))
-    world.run(0.2)
-    station.send(item_message(34, items[34]))
+    world.run(0.2 if sent else 1)
+    finish(world, station, PLAN, sent)
+
+
+@pytest.mark.parametrize(
+    ("sent", "answer", "stored"),
+    [(0, A.OPERATION_CANCELLED, OLD_RECORDS), (4, A.OPERATION_CANCELLED, OLD_RECORDS), (8, A.ACCEPTED, WRITTEN)],
+)
+def test_a_count_of_0_cancels_but_does_not_clear(
+    sent: int, answer: MissionResult, stored: tuple[WpRecord, ...]
+) -> None:
+    """It is Mission Planner's Cancel button, repeated if the answer is lost; the list on board must not be erased."""
+    world, station = holding()
+    receiving(world, station, PLAN, sent)
+    for _ in range(4):
+        station.send(count_message(0))
+        world.run(0.7)
+        assert set(acks(station)) == {answer}
+        assert world.stored == stored
     world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-    assert world.stored == records_of(items)
+    station.send(count_message(0))
+    world.run(1)
+    assert acks(station)[-1] is A.ACCEPTED
+    assert world.stored == ()
 
 
 def test_a_new_count_clears_the_previous_refusal() -> None:
@@ -468,12 +493,8 @@ def test_a_new_count_clears_the_previous_refusal() -> None:
 def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
     world, station = holding()
     items = waypoints(146)
-    upload = Upload(station, items, as_int=as_int)
-    stored_at_ack = []
-    station.on_message.append(
-        lambda message: stored_at_ack.append(world.stored) if message.get_type() == "MISSION_ACK" else None
-    )
-    assert upload.run() is A.ACCEPTED
+    stored_at_ack = listen_for_acks(world, station)
+    assert Upload(station, items, as_int=as_int).run() is A.ACCEPTED
     assert requested(station) == list(range(146))
     assert stored_at_ack == [records_of(items if as_int else rounded(items))]
     assert {(m.target_system, m.target_component) for m in station.messages("MISSION_REQUEST")} == {(255, 190)}
@@ -541,49 +562,6 @@ def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
     assert asked[4][3] - asked[4][0] < 2.5
 
 
-@pytest.mark.parametrize("result", [A.ERROR, A.DENIED, A.OPERATION_CANCELLED, A.INVALID])
-@pytest.mark.parametrize("sent", [0, 4])
-def test_an_error_from_the_ground_station_cancels(result: MissionResult, sent: int) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(8), sent)
-    station.send(ack_message(result))
-    world.run(0.1)
-    assert acks(station) == [A.OPERATION_CANCELLED]
-    assert state(world) is None
-    assert world.stored == OLD_RECORDS
-
-
-def test_a_late_ack_of_a_download_does_not_end_the_upload() -> None:
-    """Mission Planner ends a Read with MISSION_ACK, which the network may delay."""
-    world, station = holding()
-    items = waypoints(8)
-    receiving(world, station, items, 0)
-    station.send(ack_message(A.ACCEPTED))
-    world.run(1)
-    for seq in range(8):
-        station.send(item_message(seq, items[seq]))
-    world.run(1)
-    assert acks(station) == [A.ACCEPTED]
-
-
-@pytest.mark.parametrize("sent", [0, 4])
-def test_a_count_of_0_during_an_upload_cancels_it(sent: int) -> None:
-    """It is Mission Planner's Cancel button; the list on board must not be erased."""
-    world, station = holding()
-    receiving(world, station, waypoints(8), sent)
-    # Mission Planner repeats it if the answer is lost: that is no request to clear the mission either.
-    for _ in range(4):
-        station.send(count_message(0))
-        world.run(0.7)
-        assert set(acks(station)) == {A.OPERATION_CANCELLED}
-        assert world.stored == OLD_RECORDS
-    world.run(1)
-    station.send(count_message(0))
-    world.run(1)
-    assert acks(station)[-1] is A.ACCEPTED
-    assert world.stored == ()
-
-
 @pytest.mark.parametrize("late_s", [0.1, 2.0])
 def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> None:
     world, station = holding()
@@ -610,28 +588,6 @@ def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     assert acks(station) == []
     world.run(4)
     assert acks(station) == [A.ACCEPTED]
-    assert world.stored == ()
-
-
-def test_a_late_cancel_keeps_the_mission() -> None:
-    world, station = holding()
-    items = waypoints(30)
-    receiving(world, station, items, 30)
-    assert state(world) is Delivering
-    for _ in range(4):
-        station.send(count_message(0))
-        world.run(0.7)
-    assert set(acks(station)) == {A.ACCEPTED}
-    assert world.stored == records_of(items)
-
-
-@pytest.mark.parametrize("sent", [0, 4, 8])
-def test_clear_all_during_an_upload_clears(sent: int) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(8), sent)
-    station.send(clear_message())
-    world.run(2)
-    assert acks(station)[-1] is A.ACCEPTED
     assert world.stored == ()
 
 
