@@ -200,19 +200,25 @@ def test_a_dropped_roi_is_not_known(missing: dict[str, int | None]) -> None:
 # ---------------------------------------------------------------- dropped items
 
 
-@pytest.mark.parametrize("command", [0, 1, SPEED, 82, 177, 115, 206, 400, 65535])
-def test_an_unknown_command_is_dropped(command: int) -> None:
-    verdict = verdict_on(item(WAYPOINT), item(command), item(RTL))
-    assert [held.command for held in verdict.items] == [WAYPOINT, WAYPOINT, RTL]
-    assert [(f.seq, f.field, f.was, f.becomes) for f in verdict.findings] == [(2, "command", command, DROPPED)]
+#: Each item with the field for which it is dropped.
+DROPS = [
+    *((item(command), "command") for command in (0, 1, SPEED, 82, 177, 115, 206, 400, 65535)),
+    *(
+        (item(command, **{field: sent}), field)
+        for command in (WAYPOINT, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI)
+        for field in ("lat_e7", "lon_e7")
+        for sent in (0, None)
+    ),
+    *((item(command, alt_m=height), "alt_m") for command in (WAYPOINT, TURNS, TIME) for height in (NAN, INF, -INF)),
+]
 
 
-@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
-def test_without_coordinates_an_item_is_dropped(command: int) -> None:
-    for field, sent in (("lat_e7", 0), ("lat_e7", None), ("lon_e7", 0), ("lon_e7", None)):
-        verdict = verdict_on(item(WAYPOINT), item(command, **{field: sent}), item(RTL))
-        assert [held.command for held in verdict.items] == [WAYPOINT, WAYPOINT, RTL], field
-        assert [(f.seq, f.field, f.was, f.becomes) for f in verdict.findings] == [(2, field, sent, DROPPED)]
+def test_an_item_that_is_unknown_or_lacks_a_place_or_height_is_dropped() -> None:
+    for sent, field in DROPS:
+        verdict = verdict_on(item(WAYPOINT), sent, item(RTL))
+        assert [held.command for held in verdict.items] == [WAYPOINT, WAYPOINT, RTL], sent
+        assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(2, field, DROPPED)]
+        assert field == "alt_m" or verdict.findings[0].was == getattr(sent, field)
 
 
 def test_a_last_loiter_without_coordinates_is_dropped() -> None:
@@ -226,14 +232,6 @@ def test_a_return_without_a_finite_height_gets_the_minimum(height: float) -> Non
     assert [(f.field, f.becomes, f.news) for f in verdict.findings] == [("alt_m", 2, News.DANGER)]
 
 
-@pytest.mark.parametrize("command", [WAYPOINT, TURNS, TIME])
-def test_without_a_finite_height_an_item_is_dropped(command: int) -> None:
-    for height in (NAN, INF, -INF):
-        verdict = verdict_on(item(WAYPOINT), item(command, alt_m=height), item(WAYPOINT))
-        assert len(verdict.items) == 3
-        assert [(f.seq, f.field, f.becomes) for f in verdict.findings] == [(2, "alt_m", DROPPED)]
-
-
 def test_a_take_off_without_a_finite_height_is_dropped() -> None:
     assert [held.command for held in verdict_on(item(TAKEOFF, alt_m=NAN), item(WAYPOINT)).items] == [WAYPOINT] * 2
 
@@ -241,44 +239,28 @@ def test_a_take_off_without_a_finite_height_is_dropped() -> None:
 # ---------------------------------------------------------------- frames
 
 
-@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, RTL, TAKEOFF])
-def test_every_height_is_taken_as_relative(command: int) -> None:
-    for frame in (0, 3, 5, 6, 10, 11):
-        held, findings = stored(item(command, frame=frame))
-        assert held.frame == 3
-        assert findings == ({} if frame in (3, 6) else {"frame": (frame, 3)})
+FRAMES = (0, 3, 5, 6, 10, 11)
 
 
-@pytest.mark.parametrize("command", [LAND, ROI, SET_ROI])
-def test_the_frame_of_a_height_that_is_not_used_is_not_a_finding(command: int) -> None:
-    for frame in (0, 3, 5, 6, 10, 11):
+def test_every_height_is_taken_as_relative() -> None:
+    for command in (WAYPOINT, UNLIM, TURNS, TIME, RTL, TAKEOFF):
+        for frame in FRAMES:
+            held, findings = stored(item(command, frame=frame))
+            assert held.frame == 3
+            assert findings == ({} if frame in (3, 6) else {"frame": (frame, 3)})
+
+
+def test_the_frame_of_a_height_or_place_that_is_not_used_is_not_a_finding() -> None:
+    unused = [(command, frame) for command in (LAND, ROI, SET_ROI) for frame in FRAMES]
+    for command, frame in [*unused, (RTL, 2), (LAND, 2), (TAKEOFF, 2)]:
         assert stored(item(command, frame=frame))[1] == {}
 
 
-@pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
-def test_the_mission_frame_is_accepted_without_a_position(command: int) -> None:
-    assert stored(item(command, frame=2))[1] == {}
-
-
-@pytest.mark.parametrize("command", [ROI_NONE, SPEED])
-def test_the_mission_frame_is_accepted_for_a_dropped_item(command: int) -> None:
-    assert verdict_on(item(command, frame=2), item(WAYPOINT)).result is Result.ACCEPTED
-
-
-@pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI])
-def test_the_mission_frame_with_a_position_rejects_the_list(command: int) -> None:
-    items, seq = placed(item(command, frame=2))
-    assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
-
-
-@pytest.mark.parametrize("frame", [1, 4, 7, 8, 9, 12, 20, 255])
-def test_every_other_frame_rejects_the_list_except_that_of_a_dropped_item(frame: int) -> None:
-    for command in (WAYPOINT, UNLIM, TURNS, TIME, RTL, LAND, TAKEOFF, ROI, SET_ROI):
-        items, seq = placed(item(command, frame=frame))
-        assert_rejected(check_list(items, PROFILE), MissionResult.UNSUPPORTED_FRAME, seq, "frame")
-    for dropped in (item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0), item(TIME, alt_m=NAN)):
-        verdict = verdict_on(replace(dropped, frame=frame), item(WAYPOINT))
-        assert (verdict.result, len(verdict.items)) == (Result.ACCEPTED, 2)
+def test_a_dropped_item_may_have_any_frame() -> None:
+    for frame in (1, 2, 4, 7, 8, 9, 12, 20, 255):
+        for dropped in (item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0), item(TIME, alt_m=NAN)):
+            verdict = verdict_on(replace(dropped, frame=frame), item(WAYPOINT))
+            assert (verdict.result, len(verdict.items)) == (Result.ACCEPTED, 2)
 
 
 # ---------------------------------------------------------------- rejected lists
@@ -291,32 +273,45 @@ def assert_rejected(verdict: Verdict[WpRecord], ack: MissionResult, seq: int | N
     assert (verdict.records, verdict.items) == ((), ())
 
 
-@pytest.mark.parametrize(
-    ("field", "beyond", "ack"),
-    [
-        ("lat_e7", 900_000_001, MissionResult.INVALID_PARAM5_X),
-        ("lat_e7", -900_000_001, MissionResult.INVALID_PARAM5_X),
-        ("lon_e7", 1_800_000_001, MissionResult.INVALID_PARAM6_Y),
-        ("lon_e7", -1_800_000_001, MissionResult.INVALID_PARAM6_Y),
-    ],
-)
-def test_coordinates_out_of_range_reject_the_list(field: str, beyond: int, ack: MissionResult) -> None:
-    for command in (WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI):
-        items, seq = placed(item(command, **{field: beyond}))
+A = MissionResult
+LOCATED = (WAYPOINT, UNLIM, TURNS, TIME, ROI, ROI_LOCATION, SET_ROI)
+OUT_OF_RANGE = [("lat_e7", 900_000_001, A.INVALID_PARAM5_X), ("lon_e7", 1_800_000_001, A.INVALID_PARAM6_Y)]
+#: The list, the number of the item that rejects it, the ack and the field.
+REJECTIONS = [
+    *((*placed(item(command, frame=2)), A.UNSUPPORTED_FRAME, "frame") for command in LOCATED),
+    *(
+        (*placed(item(command, frame=frame)), A.UNSUPPORTED_FRAME, "frame")
+        for command in (*LOCATED, RTL, LAND, TAKEOFF)
+        for frame in (1, 4, 7, 8, 9, 12, 20, 255)
+    ),
+    *(
+        (*placed(item(command, **{field: sign * beyond})), ack, field)
+        for command in LOCATED
+        for field, beyond, ack in OUT_OF_RANGE
+        for sign in (1, -1)
+    ),
+    # In another place than the first or the last.
+    *((mission(item(WAYPOINT), item(command), item(SPEED)), 2, A.INVALID, "command") for command in (UNLIM, LAND)),
+    (mission(item(WAYPOINT), item(TAKEOFF), item(WAYPOINT)), 2, A.INVALID, "command"),
+    (mission(item(WAYPOINT), item(WAYPOINT), item(TAKEOFF)), 3, A.INVALID, "command"),
+    # A region of interest that is the last item, as received or as kept.
+    *((mission(item(WAYPOINT), item(roi)), 2, A.INVALID, "command") for roi in (ROI, ROI_LOCATION, SET_ROI)),
+    *((mission(item(WAYPOINT), item(roi, lat_e7=0)), 2, A.INVALID, "command") for roi in (ROI, ROI_LOCATION, SET_ROI)),
+    *(
+        (mission(item(WAYPOINT), item(ROI), dropped), 2, A.INVALID, "command")
+        for dropped in (item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0))
+    ),
+    # Alone: a region of interest and a dropped item do not count.
+    *((mission(item(command)), 1, A.INVALID, "command") for command in (RTL, LAND, TAKEOFF)),
+    *((mission(item(ROI), item(command)), 2, A.INVALID, "command") for command in (RTL, LAND)),
+    *((mission(item(SPEED), item(command)), 2, A.INVALID, "command") for command in (RTL, LAND)),
+    (mission(item(ROI), item(ROI), item(SPEED)), 2, A.INVALID, "command"),
+]
+
+
+def test_a_faulty_item_rejects_the_list() -> None:
+    for items, seq, ack, field in REJECTIONS:
         assert_rejected(check_list(items, PROFILE), ack, seq, field)
-
-
-@pytest.mark.parametrize("command", [UNLIM, LAND])
-def test_a_command_that_must_be_last_elsewhere_rejects_the_list(command: int) -> None:
-    verdict = verdict_on(item(WAYPOINT), item(command), item(SPEED))
-    assert_rejected(verdict, MissionResult.INVALID, 2, "command")
-
-
-@pytest.mark.parametrize("seq", [2, 3])
-def test_a_take_off_elsewhere_rejects_the_list(seq: int) -> None:
-    items = mission(item(WAYPOINT), item(WAYPOINT), item(WAYPOINT))
-    items[seq] = item(TAKEOFF)
-    assert_rejected(check_list(items, PROFILE), MissionResult.INVALID, seq, "command")
 
 
 def test_a_take_off_after_dropped_items_names_the_items_to_remove() -> None:
@@ -330,33 +325,6 @@ def test_a_list_without_home_is_reported() -> None:
     verdict = check_list([item(TAKEOFF), item(WAYPOINT)], PROFILE)
     why = "put home first, item 0 is TAKEOFF"
     assert verdict.findings[-1].text() == f"Rejected, Home: {why}"
-
-
-@pytest.mark.parametrize("roi", [ROI, ROI_LOCATION, SET_ROI])
-def test_a_roi_cannot_be_last_as_received(roi: int) -> None:
-    assert_rejected(verdict_on(item(WAYPOINT), item(roi)), MissionResult.INVALID, 2, "command")
-    assert_rejected(verdict_on(item(WAYPOINT), item(roi, lat_e7=0)), MissionResult.INVALID, 2, "command")
-
-
-@pytest.mark.parametrize("dropped", [item(SPEED), item(ROI_NONE), item(WAYPOINT, lat_e7=0)])
-def test_a_roi_cannot_be_the_last_kept_item(dropped: MissionItem) -> None:
-    verdict = verdict_on(item(WAYPOINT), item(ROI), dropped)
-    assert_rejected(verdict, MissionResult.INVALID, 2, "command")
-
-
-@pytest.mark.parametrize("command", [RTL, LAND, TAKEOFF])
-def test_some_commands_cannot_be_alone(command: int) -> None:
-    assert_rejected(verdict_on(item(command)), MissionResult.INVALID, 1, "command")
-
-
-@pytest.mark.parametrize("command", [RTL, LAND])
-def test_a_roi_or_a_dropped_item_does_not_count_as_another_command(command: int) -> None:
-    assert_rejected(verdict_on(item(ROI), item(command)), MissionResult.INVALID, 2, "command")
-    assert_rejected(verdict_on(item(SPEED), item(command)), MissionResult.INVALID, 2, "command")
-
-
-def test_a_list_of_rois_is_not_a_mission() -> None:
-    assert_rejected(verdict_on(item(ROI), item(ROI), item(SPEED)), MissionResult.INVALID, 2, "command")
 
 
 @pytest.mark.parametrize("command", [WAYPOINT, UNLIM, TURNS, TIME])
