@@ -24,7 +24,8 @@ from tests.support.settings_client import SettingsClient
 NORTH = 8983
 LAND = item(Command.NAV_LAND)
 APPROACH = FwApproach(8, 5000, 350, turns_right=False, headings=(90, -10), is_above_sea=False)
-BY_APPROACH_3 = "FW approach 3: heading 90 or 270 or 10"
+BY_APPROACH_8 = "lands by FW approach 8: heading"
+BY_APPROACH_3 = "lands by FW approach 3: heading 90 or 270 or 10"
 DOWN = "circles down and lands in any direction: no FW approach"
 NEAR, FAR = replace(WP, lat_e7=LAT + NORTH // 2), replace(WP, lat_e7=LAT + 2 * NORTH)
 
@@ -36,31 +37,95 @@ def texts(*items: MissionItem, here: tuple[int, int] | None = None, **limits: An
     return [finding.text() for finding in findings]
 
 
-def test_a_first_waypoint_at_which_inav_would_not_arm_rejects_the_list() -> None:
-    reason = "200 m from {}, nav_wp_max_safe_distance is 100 m: INAV would not arm"
-    assert texts(FAR, NEAR) == [f"Rejected, WP 1: {reason.format('home')}"]
-    assert texts(FAR, here=(LAT, LON + 1000)) == [f"Rejected, WP 1: {reason.format('the craft')}"]
-    assert texts(NEAR, FAR) == texts(FAR, nav_wp_max_safe_distance=0) == texts(FAR, nav_wp_max_safe_distance=201) == []
+YAW, ROI = item(Command.CONDITION_YAW, at=False, p1=90.0), item(Command.NAV_ROI)
+HIGH = replace(WP, lat_e7=LAT + 60 * NORTH, alt_m=200.0)
+#: Home is 123 m above the sea.
+ABOVE_SEA = replace(WP, frame=0, alt_m=173.0)
+CLOSE = replace(WP, lat_e7=LAT + NORTH // 50)
+THERE = replace(LAND, lat_e7=LAT + NORTH)
+AEROPLANE: dict[str, Any] = {"platform": Platform.AEROPLANE}
+FIXED: dict[str, Any] = {"nav_rth_alt_mode": RthAltMode.FIXED}
+SAFEHOME = Safehome(3, True, LAT + NORTH, LON)
+NOT_ARMED = "Rejected, WP 1: 200 m from {}, nav_wp_max_safe_distance is 100 m: INAV would not arm"
+TOO_LOW = "Rejected, WP 1: nav_max_altitude is 40 m: INAV would not climb to 50 m"
+SELECTED = "Stored as mission 1, mission 2 was selected"
+RETURNS = "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)"
 
 
-def test_the_first_waypoint_is_measured_from_the_craft() -> None:
-    """INAV's home is where it is armed, whatever the home of the list."""
-    assert texts(FAR, here=(LAT + 2 * NORTH, LON)) == []
-    warning = "WP 1: arms only near the list's home, 250 m off"
-    assert texts(NEAR, here=(LAT + NORTH * 5 // 2, LON)) == [warning]
+@pytest.mark.parametrize(
+    ("items", "limits", "said"),
+    [
+        ((FAR, NEAR), {}, [NOT_ARMED.format("home")]),
+        ((FAR,), {"here": (LAT, LON + 1000)}, [NOT_ARMED.format("the craft")]),
+        ((NEAR, FAR), {}, []),
+        ((FAR,), {"nav_wp_max_safe_distance": 0}, []),
+        ((FAR,), {"nav_wp_max_safe_distance": 201}, []),
+        # INAV's home is where it is armed, whatever the home of the list.
+        ((FAR,), {"here": (LAT + 2 * NORTH, LON)}, []),
+        ((NEAR,), {"here": (LAT + NORTH * 5 // 2, LON)}, ["WP 1: arms only near the list's home, 250 m off"]),
+        ((NEAR, speed(12), WP, FAR), {}, ["WP 3: 12 m/s, nav_max_auto_speed is 10 m/s (+1)"]),
+        ((NEAR, speed(12), FAR), {"nav_max_auto_speed": 1200}, []),
+        (
+            (NEAR, speed(12), FAR, YAW, NEAR, ROI, FAR),
+            AEROPLANE,
+            ["WP 3: speed ignored on an aeroplane (+2)", "WP 4: no effect on an aeroplane (+1)"],
+        ),
+        # INAV itself has no such limits.
+        (
+            (NEAR, HIGH, RTL_LANDS),
+            {},
+            ["WP 2: 5.9 km leg, over 2 km (+1)", "WP 2: 6.0 km from home, over 5 km", "WP 2: 200 m high"],
+        ),
+        ((WP,), {"nav_max_altitude": 4000}, [TOO_LOW]),
+        ((WP,), {"nav_max_altitude": 5000}, []),
+        ((WP,), {"nav_max_altitude": 4000, "nav_wp_enforce_altitude": 100}, []),
+        ((ABOVE_SEA,), {"nav_max_altitude": 4000}, [TOO_LOW]),
+        ((ABOVE_SEA,), {"nav_max_altitude": 5000}, []),
+        ((WP,), {"nav_max_altitude": 4000, "version": (7, 1, 2)}, ["WP 1: 50 m, over nav_max_altitude 40 m"]),
+        ((WP,), {"nav_max_altitude": 5000, "version": (7, 1, 2)}, []),
+        (
+            (WP, CLOSE),
+            {"nav_wp_radius": 500},
+            ["WP 2: 2.0 m from the waypoint before, within nav_wp_radius (5 m): it may count as reached at once"],
+        ),
+        ((WP, CLOSE), {"nav_wp_radius": 100}, []),
+        ((WP, RTL_LANDS), {}, []),
+        ((WP, RTL), {}, []),
+        ((WP, RTL_LANDS), FIXED, ["WP 2: RTH at nav_rth_altitude 10 m, below 50 m"]),
+        ((WP, RTL_LANDS), FIXED | {"nav_rth_altitude": 5000}, []),
+        ((WP, RTL_LANDS), {"safehomes": (Safehome(0, False, LAT, LON), SAFEHOME)}, [f"WP 2: {RETURNS}"]),
+        ((WP, RTL_LANDS), {"safehomes": (SAFEHOME,), "safehome_usage_mode": SafehomeUsageMode.RTH_FS}, []),
+        ((WP, RTL_LANDS), {"safehomes": (Safehome(3, True, LAT + 3 * NORTH, LON),)}, []),
+        ((WP,), {"selected": 2}, [SELECTED]),
+        (
+            (NEAR,),
+            AEROPLANE | {"selected": 2, "approach": APPROACH},
+            [f"{SELECTED}: each mission lands by the FW approach with the new number"],
+        ),
+        ((NEAR,), AEROPLANE | {"selected": 2}, [SELECTED]),
+        ((WP, THERE), AEROPLANE, [f"WP 2: {DOWN}"]),
+        ((WP, THERE), AEROPLANE | {"approach": APPROACH._replace(headings=(0, 0))}, [f"WP 2: {DOWN}"]),
+        ((WP, THERE), AEROPLANE | {"approach": APPROACH}, [f"WP 2: {BY_APPROACH_8} 90 or 270 or 10"]),
+        (
+            (WP, THERE),
+            AEROPLANE | {"approach": APPROACH._replace(headings=(0, 360), is_above_sea=True)},
+            [f"WP 2: {BY_APPROACH_8} 0 or 180"],
+        ),
+        ((WP, THERE), {}, []),
+        ((WP, THERE), {"approach": APPROACH}, []),
+    ],
+)
+def test_what_inav_flies_otherwise_than_the_list_is_named(
+    items: tuple[MissionItem, ...], limits: dict[str, Any], said: list[str]
+) -> None:
+    assert texts(*items, **limits) == said
 
 
-def test_a_speed_that_a_multirotor_does_not_fly_is_named() -> None:
-    assert texts(NEAR, speed(12), WP, FAR) == ["WP 3: 12 m/s, nav_max_auto_speed is 10 m/s (+1)"]
-    assert texts(NEAR, speed(12), FAR, nav_max_auto_speed=1200) == []
-
-
-def test_values_that_an_aeroplane_ignores_are_named() -> None:
-    yaw = item(Command.CONDITION_YAW, at=False, p1=90.0)
-    assert texts(NEAR, speed(12), FAR, yaw, FAR, item(Command.NAV_ROI), FAR, platform=Platform.AEROPLANE)[:2] == [
-        "WP 3: speed ignored on an aeroplane (+2)",
-        "WP 4: no effect on an aeroplane (+1)",
-    ]
+def test_inav_before_8_flies_above_nav_max_altitude() -> None:
+    board, _, station = board_with(version="7.1.2")
+    board._firmware._settings["nav_max_altitude"] = 5000  # type: ignore[union-attr]
+    assert Upload(station, [HOME, replace(NEAR, alt_m=20.0), replace(FAR, alt_m=60.0)]).run() is ACCEPTED
+    assert "WP 2: 60 m, over nav_max_altitude 50 m" in " ".join(station.texts())
 
 
 @pytest.mark.parametrize("platform", [Platform.ROVER, Platform.BOAT])
@@ -74,154 +139,25 @@ def test_differences_on_a_rover_or_boat_are_named(platform: Platform) -> None:
     ]
 
 
-def test_a_far_or_high_flight_is_reported_on_inav_without_limits() -> None:
-    far = replace(WP, lat_e7=LAT + 60 * NORTH, alt_m=200.0)
-    assert texts(NEAR, far, RTL_LANDS) == [
-        "WP 2: 5.9 km leg, over 2 km (+1)",
-        "WP 2: 6.0 km from home, over 5 km",
-        "WP 2: 200 m high",
-    ]
-
-
-def test_a_leg_that_inav_would_fly_lower_rejects_the_list() -> None:
-    reason = "Rejected, WP 1: nav_max_altitude is 40 m: INAV would not climb to 50 m"
-    assert texts(WP, nav_max_altitude=4000) == [reason]
-    assert texts(WP, nav_max_altitude=5000) == texts(WP, nav_max_altitude=4000, nav_wp_enforce_altitude=100) == []
-    # Home is 123 m above the sea.
-    above_sea = replace(WP, frame=0, alt_m=173.0)
-    assert texts(above_sea, nav_max_altitude=4000) == [reason]
-    assert texts(above_sea, nav_max_altitude=5000) == []
-
-
-def test_inav_before_8_flies_above_nav_max_altitude() -> None:
-    assert texts(WP, nav_max_altitude=4000, version=(7, 1, 2)) == ["WP 1: 50 m, over nav_max_altitude 40 m"]
-    assert texts(WP, nav_max_altitude=5000, version=(7, 1, 2)) == []
-    board, _, station = board_with(version="7.1.2")
-    board._firmware._settings["nav_max_altitude"] = 5000  # type: ignore[union-attr]
-    assert Upload(station, [HOME, replace(NEAR, alt_m=20.0), replace(FAR, alt_m=60.0)]).run() is ACCEPTED
-    assert "WP 2: 60 m, over nav_max_altitude 50 m" in " ".join(station.texts())
-
-
-def test_waypoints_within_the_radius_are_named() -> None:
-    close = replace(WP, lat_e7=LAT + NORTH // 50)
-    (news,) = texts(WP, close, nav_wp_radius=500)
-    assert news == "WP 2: 2.0 m from the waypoint before, within nav_wp_radius (5 m): it may count as reached at once"
-    assert texts(WP, close, nav_wp_radius=100) == []
-
-
 @pytest.mark.parametrize(
-    ("rtl", "limits", "news"),
+    ("safehome", "usage", "news"),
     [
-        (RTL_LANDS, {}, []),
-        (RTL, {}, []),
-        (
-            RTL_LANDS,
-            {"nav_rth_alt_mode": RthAltMode.FIXED},
-            ["RTH at nav_rth_altitude 10 m, below 50 m"],
-        ),
-        (RTL_LANDS, {"nav_rth_alt_mode": RthAltMode.FIXED, "nav_rth_altitude": 5000}, []),
-        (
-            RTL_LANDS,
-            {"safehomes": (Safehome(0, False, LAT, LON), Safehome(3, True, LAT + NORTH, LON))},
-            ["returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)"],
-        ),
-        (
-            RTL_LANDS,
-            {"safehomes": (Safehome(3, True, LAT + NORTH, LON),), "safehome_usage_mode": SafehomeUsageMode.RTH_FS},
-            [],
-        ),
-        (RTL_LANDS, {"safehomes": (Safehome(3, True, LAT + 3 * NORTH, LON),)}, []),
-    ],
-)
-def test_a_return_home_that_differs_from_the_list_is_named(
-    rtl: MissionItem, limits: dict[str, Any], news: list[str]
-) -> None:
-    assert texts(WP, rtl, **limits) == [f"WP 2: {each}" for each in news]
-
-
-def test_another_selected_mission_is_named() -> None:
-    assert texts(WP, selected=2) == ["Stored as mission 1, mission 2 was selected"]
-    first = "Stored as mission 1, mission 2 was selected"
-    aeroplane: dict[str, Any] = {"platform": Platform.AEROPLANE, "selected": 2}
-    renumbered = f"{first}: each mission lands by the FW approach with the new number"
-    assert texts(NEAR, approach=APPROACH, **aeroplane) == [renumbered]
-    assert texts(NEAR, **aeroplane) == [first]
-
-
-@pytest.mark.parametrize(
-    ("approach", "news"),
-    [
-        (None, DOWN),
-        (APPROACH._replace(headings=(0, 0)), DOWN),
-        (APPROACH, "lands by FW approach 8: heading 90 or 270 or 10"),
-        (
-            APPROACH._replace(headings=(0, 360), is_above_sea=True),
-            "lands by FW approach 8: heading 0 or 180",
-        ),
-    ],
-)
-def test_how_an_aeroplane_lands_is_named(approach: FwApproach | None, news: str) -> None:
-    there = replace(LAND, lat_e7=LAT + NORTH)
-    assert texts(WP, there, platform=Platform.AEROPLANE, approach=approach) == [f"WP 2: {news}"]
-    assert texts(WP, there, approach=approach) == []
-
-
-@pytest.mark.parametrize(
-    ("safehome", "limits", "news"),
-    [
-        (
-            None,
-            {},
-            [DOWN],
-        ),
-        (
-            Safehome(3, True, LAT + 3 * NORTH, LON, APPROACH._replace(number=3)),
-            {},
-            [DOWN],
-        ),
-        (
-            Safehome(3, True, LAT + NORTH, LON),
-            {},
-            [
-                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                DOWN,
-            ],
-        ),
-        (
-            Safehome(3, True, LAT + NORTH, LON, FwApproach(3)),
-            {},
-            [
-                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                DOWN,
-            ],
-        ),
-        (
-            Safehome(3, True, LAT + NORTH, LON, APPROACH._replace(number=3)),
-            {},
-            [
-                "returns to safehome 3, 100 m from home (safehome_max_distance is 200 m)",
-                f"lands by {BY_APPROACH_3}",
-            ],
-        ),
-        (
-            Safehome(3, True, LAT + NORTH, LON, APPROACH._replace(number=3)),
-            {"safehome_usage_mode": SafehomeUsageMode.OFF},
-            [f"lands by {BY_APPROACH_3}"],
-        ),
-        (
-            Safehome(3, True, LAT + NORTH, LON, FwApproach(3)),
-            {"safehome_usage_mode": SafehomeUsageMode.OFF},
-            [DOWN],
-        ),
+        (None, SafehomeUsageMode.RTH, [DOWN]),
+        (Safehome(3, True, LAT + 3 * NORTH, LON, APPROACH._replace(number=3)), SafehomeUsageMode.RTH, [DOWN]),
+        (SAFEHOME, SafehomeUsageMode.RTH, [RETURNS, DOWN]),
+        (SAFEHOME._replace(approach=FwApproach(3)), SafehomeUsageMode.RTH, [RETURNS, DOWN]),
+        (SAFEHOME._replace(approach=APPROACH._replace(number=3)), SafehomeUsageMode.RTH, [RETURNS, BY_APPROACH_3]),
+        (SAFEHOME._replace(approach=APPROACH._replace(number=3)), SafehomeUsageMode.OFF, [BY_APPROACH_3]),
+        (SAFEHOME._replace(approach=FwApproach(3)), SafehomeUsageMode.OFF, [DOWN]),
     ],
 )
 def test_how_an_aeroplane_lands_after_the_return_is_named(
-    safehome: Safehome | None, limits: dict[str, Any], news: list[str]
+    safehome: Safehome | None, usage: SafehomeUsageMode, news: list[str]
 ) -> None:
-    limits = {"safehomes": (safehome,) if safehome else (), **limits}
-    assert texts(WP, RTL_LANDS, platform=Platform.AEROPLANE, **limits) == [f"WP 2: {each}" for each in news]
+    limits: dict[str, Any] = {"safehomes": (safehome,) if safehome else (), "safehome_usage_mode": usage}
+    assert texts(WP, RTL_LANDS, **AEROPLANE, **limits) == [f"WP 2: {each}" for each in news]
     assert not any("lands" in text and "FW" in text for text in texts(WP, RTL_LANDS, **limits))
-    assert not any("FW" in text for text in texts(WP, RTL, platform=Platform.AEROPLANE, **limits))
+    assert not any("FW" in text for text in texts(WP, RTL, **AEROPLANE, **limits))
 
 
 def test_an_aeroplanes_approach_is_read_and_the_mission_loaded_because_only_then_inav_uses_it() -> None:
