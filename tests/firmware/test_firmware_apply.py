@@ -101,6 +101,14 @@ class Workshop:
         ):
             return apply.main(), printed.getvalue()
 
+    def refuse(self, *words: str, remove: bool = False, code: int = 1) -> str:
+        """The output of a run that is refused with these words and changes no file."""
+        before = self.files()
+        ended, printed = self.run(*(["--remove"] if remove else []))
+        assert (ended, self.files()) == (code, before)
+        assert [word for word in ("nothing was changed", *words) if word not in printed] == []
+        return printed
+
     def git(self, *arguments: str) -> str:
         command = ["git", "-C", str(self.tree), "-c", "user.name=A", "-c", "user.email=a@b", *arguments]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout
@@ -156,16 +164,11 @@ def test_another_tree_is_not_touched(workshop: Workshop, remove: bool, applied: 
     main = workshop.tree / "src" / "main.c"
     main.write_bytes(main.read_bytes().replace(b"loop();", b"loop(1);"))
     (workshop.tree / "src" / "mw.h").unlink()
-    before = workshop.files()
-    code, printed = workshop.run(*(["--remove"] if remove else []))
-    assert code == 1
-    assert "nothing was changed" in printed
+    files = " -- src/main.c src/mw.h" if applied else ""
+    way_back = f"git -C {workshop.tree} checkout 0123abc{files}\n"
+    printed = workshop.refuse("src/mw.h: is not there", way_back, remove=remove)
     assert re.search(r"src/main\.c: has SHA-256 [0-9a-f]{64}, expected", printed)
     assert ("lines of this patch" in printed) is applied
-    assert "src/mw.h: is not there" in printed
-    files = " -- src/main.c src/mw.h" if applied else ""
-    assert f"git -C {workshop.tree} checkout 0123abc{files}\n" in printed
-    assert workshop.files() == before
 
 
 @pytest.mark.parametrize("remove", [False, True])
@@ -176,25 +179,16 @@ def test_a_checkout_with_dos_line_ends_is_reported(workshop: Workshop, remove: b
     for name in ("main.c", "mw.h"):
         path = workshop.tree / "src" / name
         path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
-    before = workshop.files()
-    code, printed = workshop.run(*(["--remove"] if remove else []))
-    assert code == 1
+    printed = workshop.refuse("src/main.c: has CRLF line ends", "core.autocrlf false", remove=remove)
     assert printed.startswith(f"apply: {workshop.tree} is Tree at commit 0123abc, but checked out with CRLF line ends;")
-    assert "nothing was changed" in printed
-    assert "src/main.c: has CRLF line ends" in printed
-    assert "core.autocrlf false" in printed
     assert "SHA-256" not in printed
-    assert workshop.files() == before
 
 
 def test_dos_line_ends_of_one_file_are_reported_with_other_differences(workshop: Workshop) -> None:
     main = workshop.tree / "src" / "main.c"
     main.write_bytes(MAIN.replace(b"\n", b"\r\n"))
     (workshop.tree / "src" / "mw.h").write_bytes(b"another\n")
-    code, printed = workshop.run()
-    assert code == 1
-    assert "src/main.c: has CRLF line ends" in printed
-    assert "src/mw.h: has SHA-256" in printed
+    workshop.refuse("src/main.c: has CRLF line ends", "src/mw.h: has SHA-256")
 
 
 LONG = b"".join(b"    line(%d);\n" % number for number in range(40))
@@ -243,24 +237,15 @@ def test_conflicts_are_named_by_file_and_line_and_the_tree_is_unchanged(clone: W
     main = clone.tree / "src" / "main.c"
     main.write_bytes(b"/* mine */\n\n" + MAIN + LONG)
     (clone.tree / "src" / "util.c").write_bytes(UTIL + b"int four(void);\n")
-    before = clone.files()
-    code, printed = clone.run()
-    assert code == 2
-    assert "nothing was changed" in printed
-    assert "\n  src/main.c:1\n" in printed
-    assert "\n  src/util.c:2\n" in printed
-    assert clone.files() == before
+    clone.refuse("\n  src/main.c:1\n", "\n  src/util.c:2\n", code=2)
 
 
 def test_removing_keeps_a_changed_line_of_the_patch_as_a_conflict(clone: Workshop) -> None:
     clone.run()
     main = clone.tree / "src" / "main.c"
     main.write_bytes(main.read_bytes().replace(b"two();", b"two(2);"))
-    before = clone.files()
-    code, printed = clone.run("--remove")
-    assert code == 2
+    printed = clone.refuse(remove=True, code=2)
     assert re.search(r"^  src/main\.c:\d$", printed, re.MULTILINE)
-    assert clone.files() == before
 
 
 @given(
@@ -308,12 +293,7 @@ def test_a_half_patched_tree_is_restored(workshop: Workshop) -> None:
 
 def test_a_foreign_file_with_a_core_files_name_is_not_overwritten(workshop: Workshop) -> None:
     (workshop.tree / "src" / "naze_mission.c").write_text("/* my own */")
-    before = workshop.files()
-    code, printed = workshop.run()
-    assert code == 1
-    assert "nothing was changed" in printed
-    assert "src/naze_mission.c" in printed
-    assert workshop.files() == before
+    workshop.refuse("src/naze_mission.c")
 
 
 def test_removing_keeps_foreign_files(workshop: Workshop) -> None:
@@ -369,11 +349,7 @@ def test_all_files_change_or_none(
         failed += 1
         assert workshop.files() == before
     # Of the three patched files old and new contents are written, and of the core's files one of them.
-    times = {
-        "write_bytes": (len(CORE) + 6, len(CORE) + 6),
-        "replace": (len(CORE) + 3, 3),
-        "unlink": (0, len(CORE)),
-    }
+    times = {"write_bytes": (len(CORE) + 6, len(CORE) + 6), "replace": (len(CORE) + 3, 3), "unlink": (0, len(CORE))}
     assert failed == times[operation][remove]
 
 

@@ -6,13 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.firmware_image import (
-    FLASH_BASE,
-    PATCH_MARK,
-    ImageError,
-    check_patched,
-    parse_image,
-)
+from protocols.firmware_image import FLASH_BASE, PATCH_MARK, ImageError, check_patched, parse_image
 
 PROGRAM = struct.pack("<II", 0x2000_5000, FLASH_BASE + 0x101) + bytes(range(256)) * 2
 

@@ -91,11 +91,7 @@ save
 def test_only_the_selected_profiles_count_and_other_lines_are_listed() -> None:
     found = read_settings_file(INAV_DIFF, "diff.txt")
     assert found.board == "INAV 7.1.2"
-    assert found.values == {
-        "nav_wp_max_safe_distance": "500",
-        "model_preview_type": "3",
-        "bat_voltage_src": "RAW",
-    }
+    assert found.values == {"nav_wp_max_safe_distance": "500", "model_preview_type": "3", "bat_voltage_src": "RAW"}
     assert unread_text(found.unread) == "10 (feature), 11-12 (serial), 22 (control_profile 2)"
 
 

@@ -90,11 +90,7 @@ READINGS = st.tuples(
     ),
     POSITIONS,
     readings(Height, height_m=number(-500, 5000), climb_m_s=number(-100, 100)),
-    readings(
-        Power,
-        voltage_v=st.none() | number(0.1, 60),
-        current_a=st.none() | number(0, 300),
-    ),
+    readings(Power, voltage_v=st.none() | number(0.1, 60), current_a=st.none() | number(0, 300)),
     readings(Charge, drawn_mah=st.integers(0, 30000)),
     readings(Sticks, channels_us=st.lists(st.integers(800, 2200), min_size=4, max_size=18).map(tuple)),
     readings(Signal, strength=number(0, 1)),

@@ -10,7 +10,7 @@ import pytest
 
 from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, open_store
 from storage.store_error import StoreError
-from tests.support.sample_missions import mission
+from tests.support.sample_missions import mission, received
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
 ASIDE = "missions.db.corrupt-20260102-030405"
@@ -36,9 +36,7 @@ def path(tmp_path: Path) -> Path:
 
 def assert_works(store: MissionStore) -> None:
     number = store.add(mission(77))
-    stored = store.get(number)
-    assert stored is not None
-    assert stored.received == mission(77)
+    assert received(store, number) == mission(77)
 
 
 def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, ReceivedMission] = NOTHING) -> None:
@@ -49,10 +47,8 @@ def assert_kept_aside(path: Path, damaged: bytes, *, salvaged: Mapping[int, Rece
         assert opened.set_aside.read_bytes() == damaged
         assert opened.salvaged == len(salvaged)
         assert sorted(summary.number for summary in store.list(99)) == sorted(salvaged)
-        for number, received in salvaged.items():
-            stored = store.get(number)
-            assert stored is not None
-            assert stored.received == received
+        for number, sent in salvaged.items():
+            assert received(store, number) == sent
         assert_works(store)
 
 
@@ -172,9 +168,7 @@ def test_a_damaged_mission_does_not_hide_the_others(path: Path, sound: Path) -> 
         with pytest.raises(StoreError, match=r"mission 3 in .* was damaged on the disk"):
             store.get(3)
         assert len(store.list(99)) == MISSIONS
-        other = store.get(4)
-        assert other is not None
-        assert other.received == mission(4, items=40)
+        assert received(store, 4) == mission(4, items=40)
 
 
 @pytest.mark.parametrize("rotten", [b"\xff", b"U"])

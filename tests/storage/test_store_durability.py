@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from storage.mission_store import open_store
-from tests.support.sample_missions import mission
+from tests.support.sample_missions import mission, received
 
 #: `make soak` repeats it 200 times.
 KILLS = int(os.environ.get("STORE_KILLS", "8"))
@@ -95,9 +95,7 @@ def test_a_power_cut_damages_only_unacknowledged_data(tmp_path: Path) -> None:
         opened = open_store(copy, now=0.0)
         with opened.store as store:
             assert opened.set_aside is None
-            stored = store.get(number)
-            assert stored is not None
-            assert stored.received == mission(1)
+            assert received(store, number) == mission(1)
             assert store.add(mission(3)) > number
         shutil.rmtree(copy.parent)
 

@@ -11,7 +11,7 @@ import pytest
 
 from storage.mission_store import open_store
 from storage.store_error import StoreError
-from tests.support.sample_missions import mission
+from tests.support.sample_missions import mission, received
 
 
 def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -68,9 +68,7 @@ def test_a_full_disk_is_reported_and_keeps_earlier_missions(tmp_path: Path, limi
     with opened.store as store:
         assert opened.set_aside is None
         for number in range(1, count + 1):
-            stored = store.get(number)
-            assert stored is not None
-            assert stored.received == mission(number, items=100)
+            assert received(store, number) == mission(number, items=100)
         last = store.list(1)[0]
         assert (last.outcome, last.detail) == ("VERIFIED", "after")
 

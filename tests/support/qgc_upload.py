@@ -218,9 +218,10 @@ class QgcStation(GroundStation):
         self.upload: Transfer | None = None
         world.receive_from(self, self.pack(QGC_HEARTBEAT))
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Message, *, wait_s: float = 0.0) -> None:
         data = self.pack(message)
         self._link.carry(_name(message), lambda: self.world.receive_from(self, data))
+        self.world.run(wait_s)
 
     def carry(self, frame: bytes) -> None:
         found = [each for each in MavlinkSplitter().feed(frame) if each.msgid in _OF_A_MISSION]

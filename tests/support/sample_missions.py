@@ -3,7 +3,7 @@
 import random
 import zlib
 
-from storage.mission_store import ReceivedMission
+from storage.mission_store import MissionStore, ReceivedMission
 
 
 def mission(tag: int, items: int = 3) -> ReceivedMission:
@@ -23,3 +23,10 @@ def mission(tag: int, items: int = 3) -> ReceivedMission:
         roi_commands={tag: 201},
         sent_seqs=[*range(items)],
     )
+
+
+def received(store: MissionStore, number: int) -> ReceivedMission:
+    """The mission with this number as it was received."""
+    stored = store.get(number)
+    assert stored is not None
+    return stored.received

@@ -9,7 +9,7 @@ from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import count_message, item_message, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 OLD = waypoints(20, seed=77)
 OLD_RECORDS = records_of(OLD)
@@ -19,8 +19,7 @@ A = MissionResult
 
 def holding(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
     """A bridge connected to a board that holds the old list, and one known ground station."""
-    world = World(options, faults, speeds=(115200,), flash=OLD_FLASH)
-    world.wait_ready()
+    world = ready_world(options, faults, flash=OLD_FLASH)
     assert world.stored == OLD_RECORDS
     return world, GroundStation(world)
 
@@ -39,6 +38,13 @@ def receiving(world: World, station: GroundStation, items: list[MissionItem], se
         station.send(item_message(seq, items[seq]))
     world.run(0.001)
     station.take()
+
+
+def begun(items: list[MissionItem], sent: int, options: SimOptions | None = None) -> tuple[World, GroundStation]:
+    """A bridge whose board holds the old list, and a station that has sent the first items of an upload."""
+    world, station = holding(options)
+    receiving(world, station, items, sent)
+    return world, station
 
 
 def finish(world: World, station: GroundStation, items: list[MissionItem], sent: int = 0) -> None:
@@ -68,13 +74,11 @@ def assert_refusal_is_repeated(world: World, station: GroundStation, result: Mis
     """Mission Planner continues after any ack to its count; its further messages get the same refusal."""
     for seq in (0, 1, 0, 999):
         station.take()
-        station.send(item_message(seq, OLD[1]))
-        world.run(0.05)
+        station.send(item_message(seq, OLD[1]), wait_s=0.05)
         assert acks(station) == [result]
         assert requested(station) == []
     station.take()
-    station.send(partial_list_message())
-    world.run(0.05)
+    station.send(partial_list_message(), wait_s=0.05)
     assert acks(station) == [result]
     assert A.INVALID_SEQUENCE not in acks(station)
     assert state(world) is None

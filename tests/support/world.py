@@ -30,10 +30,10 @@ from bridge.fc.states.searching import SPEEDS
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Datagrams, Peer
 from bridge.line.conversation import Conclude, FindPending, NoteReader, Recall, Save, StoreEffect
-from bridge.missions.mission_service import MissionEnded
+from bridge.missions.mission_service import HeldMission, MissionEnded
 from bridge.model.craft import FlightMemory
 from bridge.model.events import BridgeEvent, Level
-from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission
+from bridge.model.missions import ArrivedMission, Outcome, PendingMission, RecalledMission, Refusal
 from bridge.model.settings import SettingsMemory, TakenBackup
 from bridge.sharing.msp_sharing import Program
 from protocols.mavlink.dialect import Message
@@ -284,6 +284,19 @@ class World:
         self._flush()
         return outcome
 
+    def pushed(self, items: Sequence[Any], within_s: float = 20.0) -> Any:
+        """The result of a push."""
+        outcome = self.push(items)
+        self.wait_until(lambda _: bool(outcome), within_s)
+        return outcome[0][0]
+
+    def pull(self, within_s: float = 60.0) -> HeldMission | Refusal:
+        """The mission on the board, as the command line gets it."""
+        answers: list[HeldMission | Refusal] = []
+        self.bridge.missions.pull(answers.append, self.now)
+        self.wait_until(lambda _: bool(answers), within_s)
+        return answers[0]
+
     # State for tests.
 
     @property
@@ -440,10 +453,12 @@ def _effects(firmware: Firmware | None, command: int, payload: bytes) -> frozens
     return frozenset(msp_right(board, command, payload).effect for board in boards)
 
 
-def ready_world() -> World:
-    """A world at 115200 baud whose board has been found."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+def ready_world(
+    options: SimOptions | None = None, faults: Faults | None = None, *, within_s: float = 20.0, **others: Any
+) -> World:
+    """A world at 115200 baud whose board has been found; `others`: as of a World."""
+    world = World(options, faults, speeds=(115200,), **others)
+    world.wait_ready(within_s)
     return world
 
 
@@ -499,9 +514,10 @@ class GroundStation:
         self._undecoded.clear()
         return self._received
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Message, *, wait_s: float = 0.0) -> None:
         data = self.pack(message)
         self._transmit(lambda: self.world.receive_from(self, data))
+        self.world.run(wait_s)
 
     def stay_connected(self) -> None:
         """Send a heartbeat each second from now on."""

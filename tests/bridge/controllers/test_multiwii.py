@@ -8,15 +8,14 @@ import pytest
 from bridge.controllers.nav.check import NavRules
 from protocols.mission_item import MissionItem
 from protocols.msp.nav import Nav
-from tests.bridge.controllers.nav.test_mission_store import ACCEPTED, DENIED, found, packed, plan
+from tests.bridge.controllers.nav.test_mission_store import ACCEPTED, DENIED, found, fresh, packed, plan
 from tests.support.conversations import Download, Upload
 from tests.support.fake_inav import FakeMultiwii, nav_config
 from tests.support.nav_lists import INAV, LAT, LON, MULTIWII, WP, C, findings_for, item, jump, verdict_on
 
 
 def test_multiwii_holds_a_return_home_until_the_list_is_complete() -> None:
-    multiwii = FakeMultiwii()
-    world, station = found(multiwii)
+    multiwii, world, station = fresh(FakeMultiwii)
     first = plan(20)
     assert Upload(station, first).run() is ACCEPTED
     assert multiwii.flown == packed(first)
@@ -32,8 +31,7 @@ def test_multiwii_holds_a_return_home_until_the_list_is_complete() -> None:
 
 
 def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
-    multiwii = FakeMultiwii()
-    _, station = found(multiwii)
+    multiwii, _, station = fresh(FakeMultiwii)
     sent = plan(10)
     sent[5] = replace(sent[5], lat_e7=453848000)  # 110 m away
     sent[6] = replace(sent[6], command=201, lon_e7=84733400)  # a ROI, 11 m away
@@ -49,8 +47,7 @@ def test_a_multiwiis_own_limits_are_warned_of_and_read_for_each_list() -> None:
 
 def test_a_multiwii_that_arms_during_a_read_is_not_written() -> None:
     """Not even the one that clears the record in RAM, although telemetry has not noticed arming yet."""
-    multiwii = FakeMultiwii()
-    world, station = found(multiwii)
+    multiwii, world, station = fresh(FakeMultiwii)
     assert Upload(station, plan(10)).run() is ACCEPTED
     honest = multiwii.read
 
@@ -78,8 +75,7 @@ def test_reading_a_multiwii_ends_at_an_erased_record(erased: bytes) -> None:
 
 
 def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
-    multiwii = FakeMultiwii()
-    _, station = found(multiwii)
+    multiwii, _, station = fresh(FakeMultiwii)
     assert Upload(station, plan(20)).run() is ACCEPTED
     written = multiwii.writes
     assert Upload(station, plan(20)).run() is ACCEPTED
@@ -88,8 +84,7 @@ def test_records_that_a_multiwii_already_holds_are_not_written() -> None:
 
 
 def test_only_some_records_are_read_to_notice_changes() -> None:
-    multiwii = FakeMultiwii()
-    world, station = found(multiwii)
+    world, station = found(FakeMultiwii())
     assert Upload(station, plan(40)).run() is ACCEPTED
     world.run(3)
     world.written.clear()

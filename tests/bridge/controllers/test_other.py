@@ -38,9 +38,8 @@ def test_the_arm_box_of_a_betaflight_whose_box_names_exceed_a_frame() -> None:
     board.answer = lambda frame: (  # type: ignore[method-assign]
         bytes(6) + b"\5\0\0\0\0" if frame.command == 101 else board.answers.get(frame.command)
     )
-    world, station = found(board)
-    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    world.run(3)
+    _world, station = found(board)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), wait_s=3)
     beat = station.messages("HEARTBEAT")[-1]
     assert beat.base_mode & messages.MAV_MODE_FLAG_SAFETY_ARMED
     assert beat.custom_mode == 6

@@ -8,6 +8,15 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 from reports.vehicle_groups import Attitude, Battery, Gps, Group, Position, Rc, Status
 from tests.bridge.fc.states.test_pass_through import Autopilot, passing
 from tests.bridge.vehicle.test_vehicle_report import without_age
+from tests.support.world import World
+
+
+def heard() -> tuple[World, Autopilot]:
+    """A disarmed copter in GUIDED, whose values are wanted."""
+    world, autopilot, _ = passing()
+    world.bridge.watch(Group)
+    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    return world, autopilot
 
 
 def test_groups_are_made_from_a_mavlink_autopilot() -> None:
@@ -67,27 +76,21 @@ def test_a_companion_on_board_does_not_replace_an_autopilot_that_restarts() -> N
 
 
 def test_an_unused_channel_does_not_move_the_others() -> None:
-    world, autopilot, _ = passing()
-    world.bridge.watch(Group)
-    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    world, autopilot = heard()
     autopilot.send(m.MAVLink_rc_channels_message(1, 5, 1500, 1501, 65535, 1502, 1800, *[65535] * 13, 127))
     world.run(0.05)
     assert world.bridge.group(Group.RC, world.now).channels_us == (1500, 1501, 0, 1502, 1800)
 
 
 def test_the_autopilots_own_remaining_charge_is_shown() -> None:
-    world, autopilot, _ = passing()
-    world.bridge.watch(Group)
-    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    world, autopilot = heard()
     autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, 43, 0, 0, 0, 0, 0, 0))
     world.run(0.05)
     assert world.bridge.group(Group.BATTERY, world.now).remaining_percent == 43
 
 
 def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
-    world, autopilot, _ = passing()
-    world.bridge.watch(Group)
-    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    world, autopilot = heard()
     for port in (0, 1):
         autopilot.send(m.MAVLink_rc_channels_raw_message(1, port, *[1500 + port] * 8, 127))
         world.run(0.05)
@@ -95,9 +98,7 @@ def test_the_second_block_of_channels_does_not_replace_the_first() -> None:
 
 
 def test_a_voltage_is_not_renewed_by_the_consumption() -> None:
-    world, autopilot, _ = passing()
-    world.bridge.watch(Group)
-    autopilot.send(m.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3))
+    world, autopilot = heard()
     autopilot.send(m.MAVLink_sys_status_message(7, 7, 6, 0, 12600, 100, -1, 0, 0, 0, 0, 0, 0))
     for battery in (0, 1):
         world.run(5)

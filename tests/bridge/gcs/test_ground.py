@@ -51,8 +51,7 @@ def test_the_first_frame_to_a_newcomer_is_mavlink_2(first: str) -> None:
     """QGroundControl begins in MAVLink 1, and stays in the version of the first frame that it gets."""
     world = ready_world()
     station = GroundStation(world, version=1)
-    station.send(station.heartbeat if first == "heartbeat" else m.MAVLink_param_request_list_message(1, 1))
-    world.run(3)
+    station.send(station.heartbeat if first == "heartbeat" else m.MAVLink_param_request_list_message(1, 1), wait_s=3)
     assert station.frames[0][0] == 0xFD
     # One that knows only MAVLink 1 finds the vehicle, too.
     assert [frame[5] for frame in station.frames if frame[0] == 0xFE].count(m.MAVLINK_MSG_ID_HEARTBEAT) > 10
@@ -61,16 +60,13 @@ def test_the_first_frame_to_a_newcomer_is_mavlink_2(first: str) -> None:
 def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     world = ready_world()
     station = GroundStation(world, version=1)
-    station.send(station.heartbeat)
-    world.run(1.5)
+    station.send(station.heartbeat, wait_s=1.5)
     station.version = 2
-    station.send(station.heartbeat)
-    world.run(0.01)
+    station.send(station.heartbeat, wait_s=0.01)
     station.frames.clear()
     # It may still send an occasional MAVLink 1 frame.
     station.version = 1
-    station.send(station.heartbeat)
-    world.run(2)
+    station.send(station.heartbeat, wait_s=2)
     assert versions(station) == {2}
 
 
@@ -78,11 +74,9 @@ def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
     """Mission Planner needs two heartbeats before it continues connecting."""
     world = ready_world()
     old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
-    old.send(old.heartbeat)
-    world.run(5)
+    old.send(old.heartbeat, wait_s=5)
     old.take()
-    new.send(new.heartbeat)
-    world.run(3)
+    new.send(new.heartbeat, wait_s=3)
     assert 14 <= len(new.take("HEARTBEAT")) <= 19
     assert len(old.take("HEARTBEAT")) <= 4
     world.run(10)
@@ -93,8 +87,7 @@ def test_messages_of_one_moment_share_datagrams() -> None:
     """Up to 280 bytes, in order; MAVROS cuts longer ones."""
     world = ready_world()
     station = GroundStation(world)
-    station.send(station.heartbeat)
-    world.run(5)
+    station.send(station.heartbeat, wait_s=5)
     ground = world.inside.ground
     ground.outbox.take()
     values = [own.MAVLink_named_value_int_message(0, b"number", number) for number in range(1, 21)]
@@ -110,16 +103,14 @@ def test_messages_of_one_moment_share_datagrams() -> None:
 def test_a_station_silent_for_a_minute_stops_getting_messages() -> None:
     world = ready_world()
     station = GroundStation(world)
-    station.send(station.heartbeat)
-    world.run(59)
+    station.send(station.heartbeat, wait_s=59)
     assert station.take("HEARTBEAT")
     world.run(3)
     station.take()
     world.run(5)
     assert station.received == []
     assert world.inside.ground.peers() == []
-    station.send(station.heartbeat)
-    world.run(2)
+    station.send(station.heartbeat, wait_s=2)
     assert station.messages("HEARTBEAT")
 
 
@@ -140,8 +131,7 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     world.run(5)
     assert versions(station) == {1, 2}
     assert len(station.messages("ATTITUDE")) >= 4
-    station.send(station.heartbeat)
-    world.run(65)
+    station.send(station.heartbeat, wait_s=65)
     station.take()
     world.run(5)
     assert len(station.messages("ATTITUDE")) >= 4
@@ -158,8 +148,7 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     world.run(3)
     assert everyone.messages("HEARTBEAT")
     station = GroundStation(world, "answers")
-    station.send(station.heartbeat)
-    world.run(0.01)
+    station.send(station.heartbeat, wait_s=0.01)
     everyone.take()
     world.run(5)
     assert everyone.received == []
@@ -189,8 +178,7 @@ def test_local_strangers_do_not_displace_a_station_with_heartbeats() -> None:
     assert pilot.peer in world.inside.ground.peers()
     world.run(5)
     late.send(late.heartbeat)
-    late.send(late.heartbeat)
-    world.run(1.5)
+    late.send(late.heartbeat, wait_s=1.5)
     assert late.messages("HEARTBEAT", "ATTITUDE")
 
 

@@ -28,16 +28,14 @@ def world() -> World:
 def station_of(world: World, name: str) -> GroundStation:
     # Different ids: with the same ids it would be one station that has moved.
     station = GroundStation(world, name, sysid=255 - len(world.stations))
-    station.send(station.heartbeat)
-    world.run(1.1)
+    station.send(station.heartbeat, wait_s=1.1)
     return station
 
 
 def ask(station: GroundStation, command: int, *params: float) -> int:
     """Send a command; return its result."""
     station.take()
-    station.send(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))))
-    station.world.run(0.05)
+    station.send(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))), wait_s=0.05)
     (ack,) = station.messages("COMMAND_ACK")
     assert ack.command == command
     result: int = ack.result
@@ -86,13 +84,11 @@ def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:
 
 def test_all_streams_may_be_requested_at_once_as_by_mavproxy(world: World) -> None:
     station = station_of(world, "mavproxy")
-    station.send(stream(0, 4))
-    world.run(1)
+    station.send(stream(0, 4), wait_s=1)
     rates = rates_hz(station)
     for name in ("ATTITUDE", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "VFR_HUD", "SYS_STATUS", "RC_CHANNELS"):
         assert rates[name] == pytest.approx(4, rel=0.1)
-    station.send(stream(0, 0))
-    world.run(0.1)
+    station.send(stream(0, 0), wait_s=0.1)
     assert set(rates_hz(station)) <= _UNASKED
     station.send(stream(10, 5))
     station.send(stream(6, 5, start=0))

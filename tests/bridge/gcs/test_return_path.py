@@ -17,7 +17,7 @@ from protocols.mavlink.signing import Signing, Timestamps, key_from_passphrase, 
 from protocols.mission_item import MissionResult
 from tests.bridge.fc.states.test_pass_through import Autopilot
 from tests.support.conversations import Upload, count_message, records_of, waypoints
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 STREAMS = m.MAVLink_request_data_stream_message(1, 1, 0, 50, 1)
@@ -31,9 +31,7 @@ def is_near(host: str) -> bool:
 
 
 def world_with(links: dict[str, LinkAccess] | None = None) -> World:
-    world = World(speeds=(115200,), links=links, is_near=is_near)
-    world.wait_ready()
-    return world
+    return ready_world(links=links, is_near=is_near)
 
 
 def sent_to(station: GroundStation) -> int:
@@ -49,8 +47,7 @@ def is_served(station: GroundStation) -> bool:
     """True if it gets telemetry, and an answer to a request."""
     station.frames.clear()
     station.take()
-    station.send(m.MAVLink_param_request_read_message(1, 1, b"SYSID_THISMAV", -1))
-    station.world.run(1)
+    station.send(m.MAVLink_param_request_read_message(1, 1, b"SYSID_THISMAV", -1), wait_s=1)
     kinds = {message.get_type() for message in station.messages()}
     return {"ATTITUDE", "PARAM_VALUE"} <= kinds
 
@@ -131,8 +128,7 @@ def test_a_signature_is_a_proof() -> None:
     world = world_with({"udp": LinkAccess(Signing(KEY, Timestamps(lambda: NOON)))})
     station = GroundStation(world, FAR)
     station.sign(KEY, ticks(NOON))
-    station.send(HELLO)
-    world.run(0.1)
+    station.send(HELLO, wait_s=0.1)
     assert is_served(station)
 
 

@@ -148,8 +148,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
     """It was known before, or the first one is still active: its items are ignored."""
     world = ready_world()
     first, second = GroundStation(world, "first", radio=WIFI), GroundStation(world, "second")
-    second.send(heartbeat())
-    world.run(0.5)
+    second.send(heartbeat(), wait_s=0.5)
     upload = Upload(first, PLAN)
     world.wait_until(lambda _: len(upload.requested) > 10, 5)
     newcomer = GroundStation(world, "newcomer")
@@ -165,8 +164,7 @@ def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
 def test_an_address_that_may_not_write_does_not_take_over_an_upload() -> None:
     """The first one is silent, and items come from an address that its link's rule does not allow."""
     allowed = LinkAccess(may_write=lambda peer: peer.key != "forged")
-    world = World(speeds=(115200,), links={"udp": allowed})
-    world.wait_ready()
+    world = ready_world(links={"udp": allowed})
     first = GroundStation(world, "first", radio=WIFI)
     upload = Upload(first, PLAN)
     world.wait_until(lambda _: len(upload.requested) > 10, 5)

@@ -141,8 +141,7 @@ def test_a_listener_only_asks(access: LinkAccess) -> None:
     world, autopilot = passing({"udp": access})
     pilot = on_link(GroundStation(world, "pilot"), "open")
     stranger = GroundStation(world, "stranger")
-    pilot.send(HELLO)
-    world.run(0.1)
+    pilot.send(HELLO, wait_s=0.1)
     autopilot.received.clear()
     pilot.take()
     attack(world, stranger, 0)
@@ -167,15 +166,12 @@ def test_a_command_for_another_vehicle_needs_a_proven_station(kind: str) -> None
     second = GroundStation(world, "second", sysid=SECOND_VEHICLE, compid=1)
     stranger, pilot = GroundStation(world, "stranger", sysid=99), on_link(GroundStation(world, "pilot"), "keyed")
     pilot.sign(KEY, ticks(NOON))
-    second.send(HELLO)
-    world.run(0.1)
-    stranger.send(command)
-    world.run(0.1)
+    second.send(HELLO, wait_s=0.1)
+    stranger.send(command, wait_s=0.1)
     passes_open = kind == "PARAM_SET"
     assert len(second.messages(kind)) == passes_open
     assert bool(world.inside.incoming.refused) is not passes_open
-    pilot.send(command)
-    world.run(0.1)
+    pilot.send(command, wait_s=0.1)
     assert len(second.messages(kind)) == passes_open + 1
 
 
@@ -244,8 +240,7 @@ def test_pass_through_of_everything_excludes_listeners() -> None:
     """The setting is for links that require nothing."""
     world, autopilot = passing({"keyed": LinkAccess(signing())}, everything=True)
     listener, other_station = on_link(GroundStation(world, "listener"), "keyed"), GroundStation(world, "other", sysid=7)
-    other_station.send(HELLO)
-    world.run(0.1)
+    other_station.send(HELLO, wait_s=0.1)
     autopilot.received.clear()
     other_station.take()
     for message in (HELLO, m.MAVLink_mission_request_list_message(1, 1), m.MAVLink_param_request_list_message(0, 0)):
@@ -253,6 +248,5 @@ def test_pass_through_of_everything_excludes_listeners() -> None:
     world.run(0.1)
     assert [message.get_type() for message in decoded(bytes(autopilot.received))] == ["PARAM_REQUEST_LIST"]
     assert [message for message in other_station.messages() if message.get_srcSystem() != 1] == []
-    other_station.send(m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
-    world.run(0.1)
+    other_station.send(m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), wait_s=0.1)
     assert "COMMAND_LONG" in [message.get_type() for message in decoded(bytes(autopilot.received))]

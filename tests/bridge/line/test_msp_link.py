@@ -14,7 +14,7 @@ from protocols.msp.frame import FRAME_OVERHEAD, Direction, MspFrame, MspParser, 
 from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import Download, records_of, waypoints
 from tests.support.seeds import seeds
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 #: Bytes of its send ring, and of the heartbeat that may join them.
 HARAKIRIS_RING, HEARTBEAT = 255, 25
@@ -47,8 +47,7 @@ def test_a_download_during_a_configuration_write_is_complete(stall_ms: float) ->
     for seed in seeds(3):
         draw = random.Random(seed)
         options = SimOptions(config_write_ms=stall_ms, config_write_delay_ms=draw.random() * 300)
-        world = World(options, speeds=(115200,), flash=FULL_FLASH)
-        world.wait_ready()
+        world = ready_world(options, flash=FULL_FLASH)
         world.inside.missions.held = None
         station = GroundStation(world)
         station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 300.0 + seed, 9))

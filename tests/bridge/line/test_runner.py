@@ -11,7 +11,7 @@ from protocols.mission_item import MissionResult
 from simulator.board.options import SimOptions
 from tests.support.conversations import Download, Upload, records_of, waypoints
 from tests.support.settings_client import SettingsClient
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 ITEMS = waypoints(5)
 HELD = waypoints(9, seed=77)
@@ -28,8 +28,7 @@ def bug(*_args: object) -> Iterator[object]:
 
 @pytest.fixture
 def world() -> World:
-    world = World(SimOptions(), speeds=(115200,), flash=flash_holding(records_of(HELD)))
-    world.wait_ready()
+    world = ready_world(SimOptions(), flash=flash_holding(records_of(HELD)))
     world.run(2)
     return world
 

@@ -53,11 +53,9 @@ class Craft:
         return Download(self.station).run(TIMEOUT_S)
 
     def pull(self) -> HeldMission:
-        held: list[Any] = []
-        self.world.bridge.missions.pull(held.append, self.world.now)
-        self.world.wait_until(lambda _: bool(held), TIMEOUT_S)
-        assert isinstance(held[0], HeldMission), held[0]
-        return held[0]
+        held = self.world.pull()
+        assert isinstance(held, HeldMission), held
+        return held
 
     def holds(self, items: Sequence[MissionItem]) -> bool:
         """True if it reads back as that list; home may be its own, and positions 0.4 m off."""
@@ -151,8 +149,7 @@ def test_a_new_list_replaces_the_old_list(craft: Craft) -> None:
 
 def test_a_cleared_list_reads_as_empty_and_can_be_replaced(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
-    craft.station.send(clear_message())
-    craft.world.run(6)
+    craft.station.send(clear_message(), wait_s=6)
     assert craft.world.store.outcomes()[-1] is Outcome.VERIFIED
     assert len(craft.download()) <= 1
     assert (craft.pull().records, craft.pull().items) == ((), ())
@@ -204,8 +201,7 @@ def test_does_not_send_to_an_armed_craft(craft: Craft) -> None:
     assert craft.upload(craft.plan(6)) is ACCEPTED
     craft.arm()
     assert craft.upload(craft.plan(8, 1)) is DENIED
-    craft.station.send(clear_message())
-    craft.world.run(3)
+    craft.station.send(clear_message(), wait_s=3)
     assert any("isarm" in text for text in craft.station.texts())
     craft.faults.armed = False
     craft.world.wait_until(lambda w: w.bridge.vehicle.armed is False, 30)
@@ -217,10 +213,7 @@ def test_does_not_send_to_an_armed_craft(craft: Craft) -> None:
 def test_an_armed_craft_is_not_asked_for_the_list(craft: Craft) -> None:
     craft.arm()
     craft.world.inside.missions.held = None
-    answers: list[HeldMission | Refusal] = []
-    craft.world.bridge.missions.pull(answers.append, craft.world.now)
-    craft.world.wait_until(lambda _: bool(answers), TIMEOUT_S)
-    (answer,) = answers
+    answer = craft.world.pull()
     assert isinstance(answer, Refusal)
     assert "Armed" in answer.text
 

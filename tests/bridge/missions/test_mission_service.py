@@ -11,7 +11,7 @@ from protocols.mission_item import MissionItem, MissionResult
 from protocols.msp.mission import MissionCommand
 from simulator.board.options import SimOptions
 from tests.support.conversations import Upload, ack_message, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 OLD, NEW = waypoints(20, seed=77), waypoints(30)
 OLD_FLASH = flash_holding(records_of(OLD))
@@ -27,8 +27,7 @@ def is_committing(world: World) -> bool:
 @pytest.mark.parametrize(("cut_after_s", "outcome"), [(0.0, Outcome.FAILED), (0.003, Outcome.VERIFIED)])
 def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_after_s: float, outcome: Outcome) -> None:
     """7.1 s from reset to the first reply, 25.2 s without its GPS module."""
-    world = World(SimOptions(boot_ms=boot_ms), speeds=(115200,), flash=OLD_FLASH)
-    world.wait_ready()
+    world = ready_world(SimOptions(boot_ms=boot_ms), flash=OLD_FLASH)
     station = GroundStation(world)
     upload = Upload(station, NEW)
     world.wait_until(is_committing, 5)
@@ -68,8 +67,7 @@ def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
 
 def test_other_stations_hear_only_of_new_lists() -> None:
     """A station that timed out may write the same list again."""
-    world = World(speeds=(115200,), flash=OLD_FLASH)
-    world.wait_ready()
+    world = ready_world(flash=OLD_FLASH)
     station, other = GroundStation(world), GroundStation(world, "other", sysid=254)
     other.send(ack_message(MissionResult.ACCEPTED))
     heard: list[list[str]] = []

@@ -8,14 +8,13 @@ from simulator.board.msp_options import MspOptions
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from tests.support.conversations import Download, Upload, records_of, waypoints
-from tests.support.world import GroundStation, World, flash_holding
+from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 NEVER = 1e9
 
 
 def holding(count: int = 5) -> tuple[World, GroundStation]:
-    world = World(speeds=(115200,), flash=flash_holding(records_of(waypoints(count))))
-    world.wait_ready()
+    world = ready_world(flash=flash_holding(records_of(waypoints(count))))
     return world, GroundStation(world)
 
 
@@ -31,8 +30,7 @@ def test_a_mission_is_accepted_while_mission_planner_still_waits() -> None:
 
 def inav_of(serial_task_ms: float) -> tuple[World, GroundStation]:
     board = make_board("inav", MspOptions(serial_task_ms=serial_task_ms), Faults(boxes=0))
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready()
+    world = ready_world(peer=board)
     return world, GroundStation(world)
 
 

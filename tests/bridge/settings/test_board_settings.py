@@ -136,8 +136,7 @@ def test_settings_that_could_arm_spin_or_crash_are_refused(board: str, name: str
 def test_changes_are_refused_while_a_mission_arrives() -> None:
     world, client = ready(BOARDS["patched Harakiri"])
     station = GroundStation(world)
-    station.send(messages.MAVLink_mission_count_message(1, 1, 5, 0))
-    world.run(0.1)
+    station.send(messages.MAVLink_mission_count_message(1, 1, 5, 0), wait_s=0.1)
     assert cause_of(client.change("p_roll", 40)) is Cause.OCCUPIED
     assert cause_of(client.save()) is Cause.OCCUPIED
 

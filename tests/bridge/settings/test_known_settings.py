@@ -26,7 +26,7 @@ from tests.support.conversations import Upload, waypoints
 from tests.support.seeds import seeds
 from tests.support.settings_client import BOARDS, SettingsClient, ready, restart, value_of
 from tests.support.share_program import ShareProgram
-from tests.support.world import GroundStation, Radio, World
+from tests.support.world import GroundStation, Radio, World, ready_world
 
 SET_PID, SET_BOX, SET_MISC, SET_MODE_RANGE, SET_PID_V2 = 202, 203, 207, 35, 0x2031
 RC_TUNING, PID, MISC, SETTING = 111, 112, 114, SettingCommand.SETTING
@@ -76,8 +76,7 @@ CASES = {
 
 def sealed(make: Callable[[], object], memory: SettingsMemory | None = None) -> tuple[World, GroundStation]:
     """A world whose board's settings were read."""
-    world = World(speeds=(115200,), peer=make(), memory=memory)
-    world.wait_ready(40)
+    world = ready_world(peer=make(), memory=memory, within_s=40)
     world.wait_until(lambda world: world.inside.board_settings.known.state is not None, 60)
     station = GroundStation(world)
     station.stay_connected()
@@ -154,8 +153,7 @@ def test_a_change_of_any_other_setting_of_a_patched_harakiri_is_reported_and_all
 def test_the_radius_set_and_a_calibration_begun_by_a_station_are_not_reported() -> None:
     world, station = sealed(naze)
     SettingsClient(world).wait_read()
-    station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 450, 9))
-    world.run(ROUND_S)
+    station.send(messages.MAVLink_param_set_message(1, 1, b"WPNAV_RADIUS", 450, 9), wait_s=ROUND_S)
     assert SettingsClient(world).value("gps_wp_radius") == 450
     parameters = (0, 0, 0, 0, 4, 0, 0)
     station.send(messages.MAVLink_command_long_message(1, 1, messages.MAV_CMD_PREFLIGHT_CALIBRATION, 0, *parameters))
@@ -186,15 +184,13 @@ def test_a_station_that_connects_later_is_informed_until_arming() -> None:
     heartbeat = messages.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
     late = GroundStation(world, "late")
     late.send(heartbeat)
-    late.send(heartbeat)
-    world.run(1)
+    late.send(heartbeat, wait_s=1)
     assert warnings(late) == [told]
     world.naze.faults.armed = True
     world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
     world.run(1)
     later = GroundStation(world, "later")
-    later.send(heartbeat)
-    world.run(1)
+    later.send(heartbeat, wait_s=1)
     assert warnings(later) == []
 
 
@@ -214,8 +210,7 @@ def changed_before_the_first_reading() -> World:
     memory: dict[BoardId, Mapping[str, Value]] = {}
     board = naze()
     sealed(lambda: board, memory)
-    world = World(speeds=(115200,), peer=board, memory=memory)
-    world.wait_ready(40)
+    world = ready_world(peer=board, memory=memory, within_s=40)
     assert world.inside.board_settings.known.state is None
     on_the_board(world, SettingCommand.SET_SETTING, set_setting("p_roll", 65))
     world.inside.board_settings.may_have_changed(world.now)
@@ -301,8 +296,7 @@ def test_a_board_without_the_commands_is_not_touched() -> None:
 
 @pytest.mark.parametrize("seed", seeds(1))
 def test_a_line_that_damages_frames_does_not_cause_a_report(seed: int) -> None:
-    world = World(speeds=(115200,), seed=seed)
-    world.wait_ready(40)
+    world = ready_world(seed=seed, within_s=40)
     world.faults.bit_error_rate = 1e-3
     world.run(400)
     assert world.events("settings.changed_on_board") == []

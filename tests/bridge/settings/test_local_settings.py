@@ -131,9 +131,7 @@ def test_a_fault_prevents_the_save_and_names_the_changes(name: str, fault: str) 
 
 def test_pulling_the_cable_during_the_save_leaves_the_outcome_open() -> None:
     world, _ = ready(BOARDS[NAZE])
-    result = outcome(
-        restored(world, {"p_roll": 44.0}, "", lambda _count: world.after(0.03, world.unplug)),
-    )
+    result = outcome(restored(world, {"p_roll": 44.0}, "", lambda _count: world.after(0.03, world.unplug)))
     assert not result.is_saved
     assert result.text.startswith(("Perhaps not saved: ", "Nothing saved: "))
 

@@ -118,8 +118,7 @@ def test_qgroundcontrol_is_ready_before_a_flight_controller_is_found() -> None:
     world = World(powered=False)
     station = GroundStation(world)
     screen = Screens(station).qgc
-    station.send(m.MAVLink_param_request_list_message(1, 1))
-    world.run(1)
+    station.send(m.MAVLink_param_request_list_message(1, 1), wait_s=1)
     assert (screen.dialogs, screen.is_in_setup, screen.parameters["COMPASS_USE"]) == ([], False, 0.0)
     world.power_on()
     world.run(world.naze.options.boot_ms / 1000 + 5)
@@ -145,13 +144,11 @@ def test_the_radius_of_the_plan_screen_is_a_setting_of_a_harakiri() -> None:
     world, station = radius_world()
     other = GroundStation(world, "other", sysid=254)
     other.send(m.MAVLink_ping_message(0, 0, 0, 0))
-    station.send(param_set(b"WPNAV_RADIUS", 350.0))
-    world.run(1)
+    station.send(param_set(b"WPNAV_RADIUS", 350.0), wait_s=1)
     assert values(station.messages()) == values(other.messages()) == [("WPNAV_RADIUS", 350.0, OWN - 1)]
     assert station.texts() == []
     assert SettingsClient(world).value("gps_wp_radius") == 350
-    station.send(command_of_storage(1))
-    world.run(2)
+    station.send(command_of_storage(1), wait_s=2)
     world.power_off()
     world.power_on()
     world.run(world.naze.options.boot_ms / 1000 + 5)
@@ -193,12 +190,10 @@ def test_a_parameter_that_cannot_be_set_is_answered_with_the_value() -> None:
 
 def test_a_change_just_before_arming_is_not_reported_as_unchanged() -> None:
     """The board changes it, then speaks MAVLink before it answers."""
-    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
-    world.wait_ready()
+    world = ready_world(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     SettingsClient(world).wait_read()
     station = GroundStation(world)
-    station.send(param_set(b"WPNAV_RADIUS", 400.0))
-    world.run(0.02)
+    station.send(param_set(b"WPNAV_RADIUS", 400.0), wait_s=0.02)
     world.faults.armed = True
     world.run(5)
     texts, held = station.texts(), world.naze._firmware._board.wp_radius_cm
@@ -235,12 +230,10 @@ def test_a_late_reply_to_the_first_change_does_not_confirm_the_second(hang_s: fl
     """The board hangs after the first PARAM_SET and answers both when it resumes."""
     world, station = radius_world()
     world.faults.hang = True
-    station.send(param_set(b"WPNAV_RADIUS", 300.0))
-    world.run(0.02)
+    station.send(param_set(b"WPNAV_RADIUS", 300.0), wait_s=0.02)
     world.after(hang_s, lambda: setattr(world.faults, "hang", False))
     world.run(hang_s - 0.01)
-    station.send(param_set(b"WPNAV_RADIUS", 500.0))
-    world.run(10)
+    station.send(param_set(b"WPNAV_RADIUS", 500.0), wait_s=10)
     assert values(station.messages())[-1][1] == radius_now(world, station) == world.naze._firmware._board.wp_radius_cm
 
 
@@ -264,8 +257,7 @@ def settled_world() -> tuple[World, GroundStation]:
 
 def reply_to(world: World, station: GroundStation, name: bytes, value: float, seconds: float = 1.0) -> list[Message]:
     station.take()
-    station.send(param_set(name, value))
-    world.run(seconds)
+    station.send(param_set(name, value), wait_s=seconds)
     return [each for each in station.messages() if each.get_type() in ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")]
 
 
@@ -307,8 +299,7 @@ def test_a_refused_value_is_answered_with_the_reason_and_the_value_in_force(
 def test_mission_planner_fails_a_refused_value() -> None:
     """It says "1 parameters successfully saved" after any PARAM_VALUE, and "Set P_ROLL Failed" without."""
     world, station = settled_world()
-    station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTRA3, 1, 1))
-    world.run(1)
+    station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTRA3, 1, 1), wait_s=1)
     refused = {each.get_type() for each in reply_to(world, station, b"P_ROLL", 201.0)}
     assert "PARAM_ERROR" in refused
     assert "PARAM_VALUE" not in refused
@@ -335,8 +326,7 @@ def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
     reply_to(world, station, b"P_ROLL", 44.0)
     operations = world.naze.flash_operations
     for _ in range(3):
-        station.send(command_of_storage(1))
-        world.run(2)
+        station.send(command_of_storage(1), wait_s=2)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_ACCEPTED] * 3
     assert station.texts().count("Settings saved") == 1
     written = world.naze.flash_operations
@@ -354,8 +344,7 @@ def test_a_save_after_a_refused_change_is_silent(name: bytes, value: float) -> N
     operations = world.naze.flash_operations
     assert any(each.get_type() == "PARAM_ERROR" for each in reply_to(world, station, name, value))
     station.take()
-    station.send(command_of_storage(1))
-    world.run(2)
+    station.send(command_of_storage(1), wait_s=2)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_ACCEPTED]
     assert station.texts() == []
     assert world.naze.flash_operations == operations
@@ -383,8 +372,7 @@ def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> N
     reply_to(world, station, b"P_ROLL", 44.0)
     world.faults.armed = True
     world.run(1)
-    station.send(command_of_storage(1))
-    world.run(1)
+    station.send(command_of_storage(1), wait_s=1)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
 
 
@@ -430,8 +418,7 @@ def test_lists_of_many_stations_are_sent_side_by_side_at_a_bounded_rate() -> Non
 
 def test_a_station_that_leaves_takes_the_list_along() -> None:
     world, station = settled_world()
-    station.send(m.MAVLink_param_request_list_message(1, 1))
-    world.run(0.05)
+    station.send(m.MAVLink_param_request_list_message(1, 1), wait_s=0.05)
     world.bridge.gcs_gone(station.peer, world.now)
     parameters = world.inside.parameters
     gc.collect()
@@ -441,8 +428,7 @@ def test_a_station_that_leaves_takes_the_list_along() -> None:
 
 
 def _begin_upload(world: World, station: GroundStation) -> None:
-    station.send(m.MAVLink_mission_count_message(1, 1, 20))
-    world.run(0.1)
+    station.send(m.MAVLink_mission_count_message(1, 1, 20), wait_s=0.1)
 
 
 def _arm(world: World, _station: GroundStation) -> None:

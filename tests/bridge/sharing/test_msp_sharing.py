@@ -12,7 +12,7 @@ from protocols.msp.nav import LAST, NavAction, NavRecord
 from simulator.commands.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav
 from tests.support.share_program import ShareProgram
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 DATAFLASH_READ, BOXNAMES, WP, SERVO_MIXER = 71, 116, 118, 0x2020
 #: A block of the data flash, the largest reply of an INAV.
@@ -24,8 +24,7 @@ NAME, SET_NAME, PID, SET_BOX, BOX = 10, 11, 112, 203, 113
 
 
 def ready(board: FakeInav, *, may_write: bool = False) -> tuple[World, ShareProgram]:
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready(5)
+    world = ready_world(peer=board, within_s=5)
     return world, ShareProgram(world, may_write=may_write)
 
 
@@ -111,8 +110,7 @@ def test_a_refused_change_disconnects_and_is_reported(
     board = FakeInav()
     world, program = ready(board, may_write=may_write)
     station = GroundStation(world)
-    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    world.run(1)
+    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), wait_s=1)
     program.ask(*request_)
     world.run(1)
     assert program.closed_at is not None
@@ -128,8 +126,7 @@ def test_a_refused_change_disconnects_and_is_reported(
 def test_a_program_that_repeats_a_refused_change_is_reported_once() -> None:
     world, _ = ready(FakeInav())
     station = GroundStation(world)
-    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    world.run(1)
+    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), wait_s=1)
     for port in range(20):
         ShareProgram(world, f"192.0.2.7:{port}").ask(SET_PID, bytes(30))
         world.run(0.5)
@@ -141,8 +138,7 @@ def test_a_program_that_repeats_a_refused_change_is_reported_once() -> None:
 def test_forged_addresses_do_not_flood_the_stations_with_texts() -> None:
     world, _ = ready(FakeInav())
     station = GroundStation(world)
-    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    world.run(1)
+    station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), wait_s=1)
     for host in range(200):
         ShareProgram(world, f"198.51.100.{host}:1").ask(SET_PID, bytes(30))
         world.run(0.05)
@@ -151,8 +147,7 @@ def test_forged_addresses_do_not_flood_the_stations_with_texts() -> None:
 
 def test_an_unknown_read_gets_the_reply_that_the_board_would_send() -> None:
     """mwp asks every board for INAV's commands, and goes on after the error."""
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     program = ShareProgram(world)
     for command, payload in ((SERVO_MIXER, b""), (SAFEHOME, b"\0"), (0x3999, b"")):
         assert program.wait_for(command, payload, is_v2=True) == MspFrame(Direction.ERROR, command)
@@ -208,8 +203,7 @@ def test_a_waiting_change_is_refused_once_the_craft_is_armed() -> None:
 
 
 def test_a_record_that_does_not_crash_an_inav_is_written() -> None:
-    world = World(speeds=(115200,), peer=make_board("inav"))
-    world.wait_ready(20)
+    world = ready_world(peer=make_board("inav"))
     program = ShareProgram(world, may_write=True)
     record = NavRecord(NavAction.WAYPOINT, 1, 1)
     assert program.wait_for(SET_WP, b"\1" + record.pack()).direction is Direction.REPLY
@@ -223,8 +217,7 @@ def test_an_empty_setter_is_not_a_read(
     kind: str, poison: bytes, setters: tuple[int, ...], settings: tuple[int, ...]
 ) -> None:
     """MultiWii executes it with what the request before it left in the receive buffer; INAV erases its name."""
-    world = World(speeds=(115200,), peer=make_board(kind))
-    world.wait_ready(20)
+    world = ready_world(peer=make_board(kind))
     before = [ShareProgram(world).wait_for(command) for command in settings]
     for setter in setters:
         for command, payload in ((WP, poison), (setter, b"")):
@@ -238,8 +231,7 @@ def test_an_empty_setter_is_not_a_read(
 
 def test_a_waypoint_that_a_multiwii_would_keep_in_ram_is_not_a_read() -> None:
     """The one read last decides whether a return home lands (Protocol.cpp, recallWP)."""
-    world = World(speeds=(115200,), peer=make_board("multiwii"))
-    world.wait_ready(20)
+    world = ready_world(peer=make_board("multiwii"))
     world.written.clear()
     first, home = (ShareProgram(world).outcome(WP, bytes((number,))) for number in (1, 0))
     assert first is None or first.direction is Direction.ERROR

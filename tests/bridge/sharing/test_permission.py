@@ -6,7 +6,7 @@ import pytest
 from protocols.msp.frame import Direction, request
 from simulator.commands.fc_kinds import make_board
 from tests.support.share_program import ShareProgram
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 STATUS, RAW_IMU, SERVO, MOTOR, RC, RAW_GPS, COMP_GPS, ATTITUDE, ALTITUDE, ANALOG = range(101, 111)
 BOX, WP, NAV_STATUS, STATUS_EX, SENSOR_STATUS, DEBUG, PID = 113, 118, 121, 150, 151, 254, 112
@@ -22,8 +22,7 @@ MULTIWIICONF = (STATUS, RAW_IMU, SERVO, MOTOR, RC, RAW_GPS, COMP_GPS, ALTITUDE, 
 
 
 def ready(kind: str) -> World:
-    world = World(speeds=(115200,), peer=None if kind == "harakiri" else make_board(kind))
-    world.wait_ready(30)
+    world = ready_world(peer=None if kind == "harakiri" else make_board(kind), within_s=30)
     world.run(3)
     return world
 

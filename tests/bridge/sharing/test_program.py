@@ -14,7 +14,7 @@ from simulator.commands.fc_kinds import make_board
 from terminal.files import load_mission
 from tests.support.fake_inav import FakeInav
 from tests.support.share_program import ShareProgram
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 IDENT, RC_TUNING, PID, MISC, BOXNAMES, PIDNAMES, ATTITUDE, WP = 100, 111, 112, 114, 116, 117, 108, 118
 API_VERSION, FC_VARIANT, FC_VERSION, BOARD_INFO, BUILD_INFO, UID, NAME, BOXIDS = 1, 2, 3, 4, 5, 160, 10, 119
@@ -48,9 +48,9 @@ def push_s(world: World, kind: str) -> float:
     items = load_mission(EXAMPLES / ("long-146.waypoints" if kind == "harakiri" else "naze-field.waypoints"))
     elapsed = 0.0
     for count in range(6):
-        outcome = world.push(items[: len(items) - count])
-        elapsed += world.wait_until(lambda _, outcome=outcome: outcome != [], 60)  # type: ignore[misc]
-        assert outcome[0][0].ack == m.MAV_MISSION_ACCEPTED
+        began = world.now
+        assert world.pushed(items[: len(items) - count], 60).ack == m.MAV_MISSION_ACCEPTED
+        elapsed += world.now - began
         world.run(0.5)
     return elapsed
 
@@ -89,8 +89,7 @@ def test_a_flooder_leaves_another_program_of_the_host_the_share() -> None:
 def test_reads_that_are_never_answered_do_not_slow_telemetry() -> None:
     board = FakeInav(drop=lambda frame: "reply" if frame.command in (PID, MISC) else "")
     board.answers = {**board.answers, ATTITUDE: bytes(6)}
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready(5)
+    world = ready_world(peer=board, within_s=5)
     ShareProgram(world, "192.0.2.9:1").ask_every(0.1, (ATTITUDE, b""))
     world.run(3)
     board.commands.clear()
@@ -125,8 +124,7 @@ def test_the_replies_of_polls_do_not_use_the_line() -> None:
 
 
 def test_a_poll_that_only_a_program_wants_runs_while_it_asks() -> None:
-    world = World(speeds=(115200,))
-    world.wait_ready()
+    world = ready_world()
     program = ShareProgram(world)
     program.ask_every(0.1, (ATTITUDE, b""))
     world.run(2)

@@ -11,7 +11,7 @@ from bridge.transfers.upload_states import Delivering
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem
 from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
-from tests.support.upload_bench import A, acks, finish, holding, receiving, requested, state
+from tests.support.upload_bench import A, acks, begun, finish, holding, receiving, requested, state
 from tests.support.world import GroundStation, Radio, World
 
 
@@ -35,9 +35,8 @@ def assert_written_on_request(world: World, station: GroundStation, items: list[
 
 def test_two_lists_are_never_mixed_if_a_burst_loses_the_first_item() -> None:
     """Mission Planner's "Write Fast" again, with another list of the same length."""
-    world, station = holding()
     before, after = waypoints(12, 1), waypoints(12, 2)
-    receiving(world, station, before, 6)
+    world, station = begun(before, 6)
     station.send(count_message(12))
     for seq in range(1, 10):
         station.send(item_message(seq, after[seq]))
@@ -62,9 +61,8 @@ def test_two_lists_are_never_mixed_if_a_request_is_on_the_way(repeat: float, ans
 @pytest.mark.parametrize("count", [9, 16])
 def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) -> None:
     """MAVProxy had answered two requests for item 2, and both answers arrive after its next MISSION_COUNT."""
-    world, station = holding()
     former, items = waypoints(16, 1), another(count)
-    receiving(world, station, former, 2)
+    world, station = begun(former, 2)
     late = [station.pack(item_message(2, former[2])) for _ in range(2)]
     station.radio = Radio(delay_s=0.02)
     upload = Upload(station, items)
@@ -77,22 +75,19 @@ def test_two_lists_are_never_mixed_if_items_of_the_first_are_late(count: int) ->
 
 def test_two_lists_are_never_mixed_if_a_request_and_the_repeat_are_on_their_way() -> None:
     """MAVProxy answers both with its new list's last item."""
-    world, station = holding()
     former, items = waypoints(5, 1), another(5)
-    receiving(world, station, former, 4)
+    world, station = begun(former, 4)
     world.wait_until(lambda _: 4 in requested(station), 2)
     station.send(count_message(5))
     for _ in range(2):
-        station.send(item_message(4, items[4]))
-        world.run(0.01)
+        station.send(item_message(4, items[4]), wait_s=0.01)
         assert state(world) is not Delivering
     assert_written_on_request(world, station, items)
 
 
 def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
     """To Mission Planner the repeated request for item 1 answers its new MISSION_COUNT: it sends item 0."""
-    world, station = holding()
-    receiving(world, station, waypoints(5, seed=1), 1)
+    world, station = begun(waypoints(5, seed=1), 1)
     items = waypoints(5, seed=2)
     for seq, item in enumerate(items):
         station.send(item_message(seq, item))
@@ -104,10 +99,9 @@ def test_two_lists_are_never_mixed_if_the_second_count_is_lost() -> None:
 @pytest.mark.parametrize("changed", [range(1, 12), range(3, 4), range(9, 10)])
 def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_is_lost(changed: range) -> None:
     """Both have the same home and length; the ground station sends MISSION_COUNT once."""
-    world, station = holding()
     former = waypoints(12, 1)
     latter = [replace(item, alt_m=item.alt_m + 5) if item.seq in changed else item for item in former]
-    receiving(world, station, former, 6)
+    world, station = begun(former, 6)
     world.run(3.0)
     station.pack(count_message(12))
     assert_written_on_request(world, station, latter)
@@ -136,17 +130,15 @@ def test_mission_planner_is_not_asked_for_its_items_again_after_a_lost_frame() -
     for _ in range(3):
         station.pack(item_message(4, items[4]))
         world.run(0.3)
-    station.send(item_message(4, items[4]))
-    world.run(0.001)
+    station.send(item_message(4, items[4]), wait_s=0.001)
     assert requested(station) == [4, 4, 4, 5]
     finish(world, station, items, 5)
 
 
 def test_a_list_whose_last_item_follows_a_lost_frame_is_requested_again() -> None:
     """MAVProxy does not answer after its last item: its list is not accepted."""
-    world, station = holding()
     first, second = waypoints(6, 1), another(6)
-    receiving(world, station, first, 5)
+    world, station = begun(first, 5)
     station.pack(count_message(6))
     station.send(item_message(5, second[5]))
     world.wait_until(lambda _: bool(acks(station)), 10)
@@ -166,9 +158,8 @@ def test_a_delayed_message_count_does_not_begin_the_list_again() -> None:
 
 def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
     """MAVProxy sends it once, and answers the previous list's repeated request with its present list's item."""
-    world, station = holding()
     former, items = waypoints(9, 1), another(9)
-    receiving(world, station, former, 4)
+    world, station = begun(former, 4)
     station.radio = Radio(loss=1.0)
     upload = Upload(station, items, tries=0)
     station.radio = Radio()
@@ -179,9 +170,8 @@ def test_two_lists_are_never_mixed_if_the_only_count_is_lost() -> None:
 
 
 def test_a_list_may_mix_float_and_int_items() -> None:
-    world, station = holding()
     items = waypoints(10)
-    receiving(world, station, items, 0)
+    world, station = begun(items, 0)
     for seq, item in enumerate(items):
         station.send(item_message(seq, item, as_int=bool(seq % 2)))
     world.run(1)
@@ -190,9 +180,8 @@ def test_a_list_may_mix_float_and_int_items() -> None:
 
 def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
     """Mission Planner's "Write Fast" sends ten at once, then waits for the request for the eleventh."""
-    world, station = holding()
     items = waypoints(40)
-    receiving(world, station, items, 0)
+    world, station = begun(items, 0)
     for first in range(0, 40, 10):
         station.take()
         for seq in range(first, first + 10):
@@ -205,29 +194,24 @@ def test_a_burst_of_items_is_acknowledged_item_by_item() -> None:
 
 
 def test_items_out_of_order_are_kept_and_missing_items_requested() -> None:
-    world, station = holding()
     items = waypoints(8)
-    receiving(world, station, items, 0)
+    world, station = begun(items, 0)
     for seq, wanted in [(0, 1), (2, 1), (3, 1), (7, 1), (1, 4), (5, 4), (6, 4)]:
         station.take()
-        station.send(item_message(seq, items[seq]))
-        world.run(0.001)
+        station.send(item_message(seq, items[seq]), wait_s=0.001)
         assert requested(station) == [wanted]
-    station.send(item_message(4, items[4]))
-    world.run(1)
+    station.send(item_message(4, items[4]), wait_s=1)
     assert acks(station) == [A.ACCEPTED]
     assert world.stored == records_of(items)
 
 
 def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
-    world, station = holding()
     items = waypoints(8)
-    receiving(world, station, items, 5)
+    world, station = begun(items, 5)
     for seq in (1, 4, 4, 2):
         world.run(0.12)
         station.take()
-        station.send(item_message(seq, items[seq]))
-        world.run(0.001)
+        station.send(item_message(seq, items[seq]), wait_s=0.001)
         assert requested(station) == [5]
     finish(world, station, items, 5)
 
@@ -246,12 +230,10 @@ def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
 
 
 def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continues() -> None:
-    world, station = holding()
     items = waypoints(8)
-    receiving(world, station, items, 3)
+    world, station = begun(items, 3)
     for seq in (8, 9, 65535):
         station.take()
-        station.send(item_message(seq, items[0]))
-        world.run(0.001)
+        station.send(item_message(seq, items[0]), wait_s=0.001)
         assert acks(station) == [A.INVALID_SEQUENCE]
     finish(world, station, items, 3)

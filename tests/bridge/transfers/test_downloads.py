@@ -33,8 +33,7 @@ A = MissionResult
 
 
 def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tuple[World, GroundStation]:
-    world = World(options, speeds=(115200,), flash=flash)
-    world.wait_ready()
+    world = ready_world(options, flash=flash)
     world.run(2)
     return world, GroundStation(world)
 
@@ -42,8 +41,7 @@ def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tupl
 def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
     """Send a message; return the mission messages addressed to the sender in reply."""
     station.take()
-    station.send(message)
-    station.world.run(seconds)
+    station.send(message, wait_s=seconds)
     return [message for message in station.messages() if station.is_target_of(message)]
 
 
@@ -205,8 +203,7 @@ def test_a_snapshot_ends_with_the_download(ends: str) -> None:
     assert Upload(station if ends == "own upload" else writer, new).run() is A.ACCEPTED
     match ends:
         case "ack":
-            station.send(ack_message(A.ACCEPTED))
-            world.run(0.1)
+            station.send(ack_message(A.ACCEPTED), wait_s=0.1)
         case "time":
             world.run(25)
         case "new flight controller":
@@ -226,8 +223,7 @@ def test_two_stations_read_at_once() -> None:
 
 @pytest.mark.parametrize("seed", seeds(3))
 def test_a_download_over_a_bad_radio_link_is_exact(seed: int) -> None:
-    world = World(speeds=(115200,), flash=OLD_FLASH, seed=seed)
-    world.wait_ready()
+    world = ready_world(flash=OLD_FLASH, seed=seed)
     station = GroundStation(world, radio=Radio(loss=0.1, repeat=0.1, delay_s=0.05, spread_s=0.1))
     items = Download(station, repeat_s=0.6, tries=20).run()
     assert [(item.lat_e7, item.lon_e7, item.alt_m) for item in items] == [
@@ -384,8 +380,7 @@ def test_a_download_ends_the_stations_own_silent_upload_without_an_ack(sent: int
     """QGroundControl gives up an upload after 1.5 s of silence; an ack would be an error of its download."""
     world, station = holding()
     new = waypoints(20, 4)
-    station.send(count_message(20))
-    world.run(0.1)
+    station.send(count_message(20), wait_s=0.1)
     if sent == 20:
         world.store.delay_s = 2.5
     for item in new[:sent]:
@@ -412,8 +407,7 @@ def test_a_delayed_list_request_does_not_end_an_upload() -> None:
 
 def test_mission_current_has_the_number_of_items_held() -> None:
     world, station = holding()
-    station.send(count_message(1))
-    world.run(1.5)
+    station.send(count_message(1), wait_s=1.5)
     current = station.messages("MISSION_CURRENT")[-1]
     assert (current.seq, current.total, current.mission_state) == (0, 19, 2)
     Upload(station, waypoints(5)).run()

@@ -21,8 +21,7 @@ def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
 def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     world, station = holding()
     outcome = world.push(waypoints(146))
-    station.send(count_message(5))
-    world.run(0.05)
+    station.send(count_message(5), wait_s=0.05)
     assert requested(station) == []
     world.wait_until(lambda _: bool(outcome), 2)
     world.run(0.1)

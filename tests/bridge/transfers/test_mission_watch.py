@@ -20,7 +20,7 @@ from tests.bridge.controllers.nav.test_mission_store import packed, plan
 from tests.bridge.controllers.nav.test_stored_missions import Bench, sets
 from tests.support.conversations import Upload
 from tests.support.msp_bench import waypoint
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 NAV_WP = 1 << BOXES["9.1.0"].index(28)
 
@@ -62,8 +62,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
     options = MspOptions(serial_task_ms=10.0)
     eeprom = new_eeprom(kind, options)
     board = make_board(kind, options, Faults(boxes=0), memoryview(eeprom))
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready(20)
+    world = ready_world(peer=board)
     world.run(2)
     station = GroundStation(world)
     assert Upload(station, plan(size + 1), tries=60).run(60) is ACCEPTED

@@ -11,6 +11,7 @@ from tests.support.qgc_upload import QGC_HEARTBEAT
 from tests.support.upload_bench import (
     A,
     acks,
+    begun,
     holding,
     partial_list_message,
     receiving,
@@ -25,19 +26,16 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     world.run(10.5)
     station.take()
-    station.send(partial_list_message())
-    world.run(1)
+    station.send(partial_list_message(), wait_s=1)
     assert acks(station) == [A.UNSUPPORTED]
     assert "A mission can only be written as a whole" in station.texts()
 
 
 def test_a_repeated_last_item_is_answered_by_the_final_ack() -> None:
-    world, station = holding(SimOptions(flash_erase_ms=1200))
     items = waypoints(146)
-    receiving(world, station, items, 146)
+    world, station = begun(items, 146, SimOptions(flash_erase_ms=1200))
     for _ in range(3):
-        station.send(item_message(145, items[145]))
-        world.run(0.3)
+        station.send(item_message(145, items[145]), wait_s=0.3)
         assert state(world) is Delivering
         assert acks(station) == []
         assert requested(station) == []
@@ -45,29 +43,25 @@ def test_a_repeated_last_item_is_answered_by_the_final_ack() -> None:
     world.run(1)
     for _ in range(4):
         station.take()
-        station.send(item_message(145, items[145]))
-        world.run(0.45)
+        station.send(item_message(145, items[145]), wait_s=0.45)
         assert acks(station) == [A.ACCEPTED]
         assert state(world) is None
     # Only the last item.
     station.take()
-    station.send(item_message(20, items[20]))
-    world.run(0.45)
+    station.send(item_message(20, items[20]), wait_s=0.45)
     assert acks(station) == []
     assert world.naze.counters.flash_writes == 2
 
 
 def test_a_lost_final_ack_is_sent_again() -> None:
-    world, station = holding()
     items = waypoints(20)
-    receiving(world, station, items, 19)
+    world, station = begun(items, 19)
     station.radio.loss = 1.0
     world.receive_from(station, station.pack(item_message(19, items[19])))
     world.run(1.5)
     station.radio.loss = 0.0
     assert acks(station) == []
-    station.send(item_message(19, items[19]))
-    world.run(0.1)
+    station.send(item_message(19, items[19]), wait_s=0.1)
     assert acks(station) == [A.ACCEPTED]
 
 
@@ -99,19 +93,16 @@ def test_a_station_that_continues_gets_a_single_final_ack(next_message: Message)
     station.send(QGC_HEARTBEAT)
     receiving(world, station, waypoints(8), 8)
     world.wait_until(lambda _: bool(acks(station)), 3)
-    station.send(next_message)
-    world.run(1)
+    station.send(next_message, wait_s=1)
     assert len([at for at, message in station.received if message.get_type() == "MISSION_ACK"]) == 1
 
 
 def test_an_item_that_crosses_the_final_ack_is_ignored() -> None:
     """The bridge has requested it again while it wrote the list, or the network has doubled it."""
-    world, station = holding()
     items = waypoints(8)
-    receiving(world, station, items, 8)
+    world, station = begun(items, 8)
     world.wait_until(lambda _: bool(acks(station)), 3)
-    station.send(item_message(7, items[7]))
-    world.run(0.2)
+    station.send(item_message(7, items[7]), wait_s=0.2)
     assert len(station.messages("MISSION_ACK")) == 1
 
 

@@ -34,6 +34,7 @@ from tests.support.upload_bench import (
     A,
     acks,
     assert_refusal_is_repeated,
+    begun,
     finish,
     hanging_push,
     holding,
@@ -43,7 +44,7 @@ from tests.support.upload_bench import (
     requested,
     state,
 )
-from tests.support.world import GroundStation, Radio, World, flash_holding
+from tests.support.world import GroundStation, Radio, World, flash_holding, ready_world
 
 # Before the first item.
 
@@ -59,8 +60,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         *([clear_message(mission_type)] if mission_type != 255 else []),
     ):
         station.take()
-        station.send(message)
-        world.run(0.3)
+        station.send(message, wait_s=0.3)
         answers = [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")]
         assert answers == [(A.UNSUPPORTED, mission_type)]
         assert requested(station) == []
@@ -89,8 +89,7 @@ def test_an_upload_while_armed_is_denied() -> None:
 
 
 def test_arming_while_items_arrive_denies_the_upload() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(50), 10)
+    world, station = begun(waypoints(50), 10)
     world.faults.armed = True
     world.run(0.5)
     assert acks(station) == [A.DENIED]
@@ -118,8 +117,7 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     world.wait_until(lambda _: bool(acks(station)), 2)
     assert stored_at_ack == [()]
     # The second time nothing is written.
-    station.send(message)
-    world.run(1)
+    station.send(message, wait_s=1)
     assert acks(station) == [A.ACCEPTED, A.ACCEPTED]
     assert {ack.mission_type for ack in station.messages("MISSION_ACK")} == {getattr(message, "mission_type", MISSION)}
     assert world.naze.counters.flash_writes == 2
@@ -166,8 +164,7 @@ def test_two_simultaneous_uploads_both_succeed() -> None:
 
 
 def test_a_slow_upload_does_not_delay_others() -> None:
-    world, slow = holding()
-    receiving(world, slow, waypoints(4, 1), 0)
+    world, slow = begun(waypoints(4, 1), 0)
     for seq in range(4):
         world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
     world.run(2)
@@ -206,8 +203,7 @@ def test_only_some_cancelled_lists_are_stored() -> None:
         station.send(count_message(3))
         world.wait_until(lambda _: bool(requested(station)), 2)
         station.send(item_message(0, OLD[0]))
-        station.send(ack_message(A.ERROR))
-        world.run(0.3)
+        station.send(ack_message(A.ERROR), wait_s=0.3)
     assert 10 < len(world.store.missions) <= 25
 
 
@@ -215,8 +211,7 @@ def test_only_some_cancelled_lists_are_stored() -> None:
 def test_the_upload_of_a_station_that_disconnects_ends_before_the_write(
     sent: int, stored: tuple[WpRecord, ...]
 ) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(60), sent)
+    world, station = begun(waypoints(60), sent)
     world.bridge.gcs_gone(station.peer, world.now)
     assert state(world) is (Delivering if sent == 60 else None)
     world.run(3)
@@ -227,24 +222,19 @@ def test_the_upload_of_a_station_that_disconnects_ends_before_the_write(
 
 def test_a_list_announced_again_before_the_write_is_received_again() -> None:
     """The new one may differ: the ack of the previous list would seem to be its own."""
-    world, station = holding()
-    receiving(world, station, waypoints(8), 7)
+    world, station = begun(waypoints(8), 7)
     world.store.delay_s = 1.0
     world.push(waypoints(3))
-    station.send(item_message(7, waypoints(8)[7]))
-    world.run(0.1)
-    station.send(count_message(8))
-    world.run(8)
+    station.send(item_message(7, waypoints(8)[7]), wait_s=0.1)
+    station.send(count_message(8), wait_s=8)
     assert A.ACCEPTED not in acks(station)
     assert world.stored != records_of(waypoints(8))
 
 
 def test_a_complete_list_that_waits_too_long_is_denied() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(8), 7)
+    world, station = begun(waypoints(8), 7)
     hanging_push(world)
-    station.send(item_message(7, waypoints(8)[7]))
-    world.run(2.4)
+    station.send(item_message(7, waypoints(8)[7]), wait_s=2.4)
     assert acks(station) == []
     world.run(0.2)
     assert acks(station) == [A.DENIED]
@@ -259,16 +249,14 @@ def test_a_waiting_upload_can_be_cancelled(message: Message) -> None:
     second = GroundStation(world, "second", sysid=254)
     receiving(world, station, waypoints(8), 3)
     second.send(count_message(5))
-    second.send(message)
-    world.run(0.1)
+    second.send(message, wait_s=0.1)
     assert acks(second) == [A.OPERATION_CANCELLED]
     finish(world, station, waypoints(8), 3)
 
 
 @pytest.mark.parametrize(("sent", "count"), [(0, 30), (1, 7), (10, 60), (29, 30)])
 def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(30, 1), sent)
+    world, station = begun(waypoints(30, 1), sent)
     again = waypoints(count, 2)
     assert Upload(station, again).run() is A.ACCEPTED
     assert world.stored == records_of(again)
@@ -319,9 +307,8 @@ def test_mission_planner_goes_on_after_a_gap_in_the_wifi(gap_s: float, at_s: flo
 
 @pytest.mark.parametrize("after_s", [0.001, 0.02, 0.1, 0.2])
 def test_the_same_station_restarts_while_the_list_is_written(after_s: float) -> None:
-    world, station = holding()
     first, again = waypoints(146, 1), waypoints(12, 2)
-    receiving(world, station, first, 146)
+    world, station = begun(first, 146)
     world.run(after_s)
     assert state(world) is Delivering
     upload = Upload(station, again)
@@ -343,12 +330,10 @@ def test_a_list_takes_the_place_of_a_waiting_clear() -> None:
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
 def test_a_new_count_suppresses_the_ack_of_the_previous_list(announce: Message) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(146, 1), 146)
+    world, station = begun(waypoints(146, 1), 146)
     world.run(0.05)
     assert state(world) is Delivering
-    station.send(announce)
-    world.run(1)
+    station.send(announce, wait_s=1)
     # A count of 0 is Mission Planner's Cancel and comes too late; a clear gets the only ack.
     assert acks(station) == ([] if announce.get_type() == "MISSION_COUNT" and announce.count else [A.ACCEPTED])
 
@@ -382,8 +367,7 @@ def test_an_upload_without_a_link_is_denied() -> None:
     refused(world, station, 5, A.DENIED, "No link")
     for message in (count_message(0), clear_message()):
         station.take()
-        station.send(message)
-        world.run(0.1)
+        station.send(message, wait_s=0.1)
         assert acks(station) == [A.DENIED]
 
 
@@ -396,8 +380,7 @@ def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
     receiving(world, station, items, 0)
     for seq in set(range(35)) - {7, 20, 34}:
         station.send(item_message(seq, items[seq]))
-    station.send(ack_message(A.ACCEPTED))
-    world.run(0.4)
+    station.send(ack_message(A.ACCEPTED), wait_s=0.4)
     text = "Mission NOT written: 3 of 35 missing, use Write"
     assert station.texts() == [text]
     assert acks(station) == [A.OPERATION_CANCELLED]
@@ -409,10 +392,8 @@ def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
 
 
 def test_a_new_upload_ends_the_reminders() -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(35), 12)
-    station.send(ack_message(A.ACCEPTED))
-    world.run(0.5)
+    world, station = begun(waypoints(35), 12)
+    station.send(ack_message(A.ACCEPTED), wait_s=0.5)
     assert Upload(station, waypoints(35)).run() is A.ACCEPTED
     station.take()
     world.run(10)
@@ -435,10 +416,8 @@ REFUSALS = [ack_message(result) for result in (A.ERROR, A.DENIED, A.OPERATION_CA
 def test_a_station_cancels_or_clears_in_the_middle(
     sent: int, message: Message, answer: MissionResult, stored: tuple[WpRecord, ...]
 ) -> None:
-    world, station = holding()
-    receiving(world, station, PLAN, sent)
-    station.send(message)
-    world.run(3)
+    world, station = begun(PLAN, sent)
+    station.send(message, wait_s=3)
     assert acks(station)[-1] is answer
     assert stored == () or len(acks(station)) == 1
     assert (state(world), world.stored) == (None, stored)
@@ -447,10 +426,8 @@ def test_a_station_cancels_or_clears_in_the_middle(
 @pytest.mark.parametrize("sent", [0, 7])
 def test_a_late_ack_of_a_download_does_not_end_the_upload(sent: int) -> None:
     """Mission Planner ends a Read with MISSION_ACK, which the network may delay, and *Write Fast* with another."""
-    world, station = holding()
-    receiving(world, station, PLAN, sent)
-    station.send(ack_message(A.ACCEPTED))
-    world.run(0.2 if sent else 1)
+    world, station = begun(PLAN, sent)
+    station.send(ack_message(A.ACCEPTED), wait_s=0.2 if sent else 1)
     finish(world, station, PLAN, sent)
 
 
@@ -462,16 +439,13 @@ def test_a_count_of_0_cancels_but_does_not_clear(
     sent: int, answer: MissionResult, stored: tuple[WpRecord, ...]
 ) -> None:
     """It is Mission Planner's Cancel button, repeated if the answer is lost; the list on board must not be erased."""
-    world, station = holding()
-    receiving(world, station, PLAN, sent)
+    world, station = begun(PLAN, sent)
     for _ in range(4):
-        station.send(count_message(0))
-        world.run(0.7)
+        station.send(count_message(0), wait_s=0.7)
         assert set(acks(station)) == {answer}
         assert world.stored == stored
     world.run(1)
-    station.send(count_message(0))
-    world.run(1)
+    station.send(count_message(0), wait_s=1)
     assert acks(station)[-1] is A.ACCEPTED
     assert world.stored == ()
 
@@ -481,8 +455,7 @@ def test_a_new_count_clears_the_previous_refusal() -> None:
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     station.take()
-    station.send(item_message(1, OLD[1]))
-    world.run(0.1)
+    station.send(item_message(1, OLD[1]), wait_s=0.1)
     assert acks(station) == []
 
 
@@ -503,8 +476,7 @@ def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
 
 @pytest.mark.parametrize("sent", [0, 3])
 def test_an_unanswered_request_is_repeated_for_five_seconds(sent: int) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(8), sent)
+    world, station = begun(waypoints(8), sent)
     began = world.now
     world.wait_until(lambda _: bool(acks(station)), 10)
     assert world.now - began == pytest.approx(5.0, abs=0.05)
@@ -572,8 +544,7 @@ def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> Non
     station.take()
     world.run(late_s)
     station.take()
-    station.send(count_message(0))
-    world.run(1)
+    station.send(count_message(0), wait_s=1)
     assert acks(station) == [A.INVALID]
     assert world.stored == OLD_RECORDS
 
@@ -583,8 +554,7 @@ def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     hanging_push(world)
     world.run(1)
     for _ in range(3):
-        station.send(count_message(0))
-        world.run(0.3)
+        station.send(count_message(0), wait_s=0.3)
     assert acks(station) == []
     world.run(4)
     assert acks(station) == [A.ACCEPTED]
@@ -638,8 +608,7 @@ def test_changes_that_cannot_matter_are_not_spoken() -> None:
 @pytest.mark.parametrize("lose", [World.unplug, World.power_off])
 @pytest.mark.parametrize("sent", [0, 4, 30])
 def test_the_flight_controller_is_lost_during_the_write(lose: Callable[[World], None], sent: int) -> None:
-    world, station = holding()
-    receiving(world, station, waypoints(30), sent)
+    world, station = begun(waypoints(30), sent)
     world.run(0.05 if sent == 30 else 0.001)
     station.take()
     lose(world)
@@ -654,8 +623,7 @@ def test_the_flight_controller_is_lost_during_the_write(lose: Callable[[World], 
 
 def test_the_flight_controller_is_lost_while_it_is_asked() -> None:
     world, station = holding()
-    station.send(count_message(5))
-    world.run(0.0005)
+    station.send(count_message(5), wait_s=0.0005)
     assert state(world) is Asking
     world.unplug()
     world.run(0.1)
@@ -676,8 +644,7 @@ def test_a_failing_or_slow_store_does_not_prevent_an_upload(failing: bool) -> No
 def test_uploads_over_a_bad_radio_link_are_exact_or_refused() -> None:
     accepted = 0
     for seed in seeds(3):
-        world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH)
-        world.wait_ready()
+        world = ready_world(seed=seed, flash=OLD_FLASH)
         station = GroundStation(world, radio=Radio(loss=0.1, repeat=0.1, delay_s=0.1 * (seed % 3), spread_s=0.05))
         items = waypoints(25, seed)
         result = Upload(station, items).run(120)
@@ -692,8 +659,7 @@ def test_uploads_over_a_bad_radio_link_are_exact_or_refused() -> None:
 @pytest.mark.parametrize("late_s", [0.02, 0.2])
 def test_late_wake_ups_do_not_lose_items(late_s: float) -> None:
     for seed in seeds(2):
-        world = World(speeds=(115200,), seed=seed, flash=OLD_FLASH, late_s=late_s)
-        world.wait_ready()
+        world = ready_world(seed=seed, flash=OLD_FLASH, late_s=late_s)
         station = GroundStation(world, radio=Radio(loss=0.05, repeat=0.05, delay_s=0.02, spread_s=0.02))
         items = waypoints(40, seed)
         assert Upload(station, items).run(60) is A.ACCEPTED

@@ -14,7 +14,7 @@ from simulator.board.options import Faults, SimOptions, TelemetryProtocol
 from tests.support.conversations import waypoints
 from tests.support.fake_controllers import HARAKIRI_CAPABILITY, MspFake, ident
 from tests.support.seeds import seeds
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)
@@ -30,12 +30,10 @@ NAMES = {205: "Accel", 206: "Compass"}
 
 
 def a_world(options: SimOptions | None = None, faults: Faults | None = None) -> tuple[World, GroundStation]:
-    world = World(options, faults, speeds=(115200,))
-    world.wait_ready()
+    world = ready_world(options, faults)
     world.run(1)
     station = GroundStation(world)
-    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
-    world.run(0.1)
+    station.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3), wait_s=0.1)
     world.written.clear()
     return world, station
 
@@ -64,8 +62,7 @@ def test_an_action_is_done_once_on_the_ground(
     make: Callable[[int, tuple[float, ...]], Message], command: int, params: tuple[float, ...], action: int
 ) -> None:
     world, station = a_world()
-    station.send(make(command, params))
-    world.run(0.6)
+    station.send(make(command, params), wait_s=0.6)
     assert results(station) == [IN_PROGRESS]
     assert done(world) == [action]
     assert station.texts()[-1] == "Calibrating: the board then reboots (up to 5 min)"
@@ -76,26 +73,43 @@ def test_an_action_is_done_once_on_the_ground(
     assert done(world) == [action]
 
 
-@pytest.mark.parametrize("what", [0, 2, math.nan, math.inf])
-def test_settings_are_not_loaded_or_reset(what: float) -> None:
-    world, station = a_world()
-    station.send(long(STORAGE, (what, 0, 0, 0, 0, 0, 0)))
-    world.run(0.3)
-    assert results(station) == [DENIED]
-    assert station.texts() == ["Settings can be saved, but not loaded or reset"]
+def assert_not_done(
+    world: World, station: GroundStation, command: int, params: tuple[float, ...], result: int, said: str
+) -> None:
+    station.send(long(command, params), wait_s=0.5)
+    assert results(station) == [result]
+    assert said in station.texts()[0]
     assert done(world) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "result", "said"),
+    [
+        *(
+            (STORAGE, (what, 0, 0, 0, 0, 0, 0), DENIED, "Settings can be saved, but not loaded or reset")
+            for what in (0, 2, math.nan, math.inf)
+        ),
+        (CALIBRATION, (0, 0, 0, 1, 0, 0, 0), UNSUPPORTED, ""),  # radio control
+        (CALIBRATION, (0, 1, 0, 0, 1, 0, 0), UNSUPPORTED, ""),  # two at once
+        (CALIBRATION, (0, 0, 0, 0, 0, 0, 0), UNSUPPORTED, ""),
+        (CALIBRATION, (math.nan, 0, 0, 0, 0, 0, 0), UNSUPPORTED, ""),
+    ],
+)
+def test_other_actions_are_refused(command: int, params: tuple[float, ...], result: int, said: str) -> None:
+    assert_not_done(*a_world(), command, params, result, said)
 
 
 @pytest.mark.parametrize(("command", "params", "action"), ALL)
 def test_does_not_act_while_armed(command: int, params: tuple[float, ...], action: int) -> None:
     world, station = a_world()
-    world.faults.armed = True
     # Even before the bridge has noticed that it is armed.
-    station.send(long(command, params))
-    world.run(0.5)
-    assert results(station) == [DENIED]
-    assert station.texts() == [f"{NAMES[action]} calibration failed: armed"]
-    assert done(world) == []
+    world.faults.armed = True
+    assert_not_done(world, station, command, params, DENIED, f"{NAMES[action]} calibration failed: armed")
+
+
+def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("simulator.board.msp_port.SensorReplies", partial(SensorReplies, sensors=0b1011))
+    assert_not_done(*a_world(), *COMPASS[:2], DENIED, "Compass calibration failed: no such sensor")
 
 
 @pytest.mark.parametrize("tele_prot", [TelemetryProtocol.MAVLINK, TelemetryProtocol.FRSKY_9600])
@@ -105,8 +119,7 @@ def test_does_not_act_unless_the_arming_state_can_be_read(tele_prot: TelemetryPr
     for seconds in (0.02, 0.3, 4.0):
         world.run(seconds)
         station.take()
-        station.send(long(*COMPASS[:2]))
-        world.run(3)
+        station.send(long(*COMPASS[:2]), wait_s=3)
         assert len(results(station)) == 1
         assert results(station)[0] in (DENIED, FAILED)
     assert done(world) == []
@@ -119,8 +132,7 @@ def test_on_unknown_firmware_an_action_is_unsupported() -> None:
     world.wait_until(lambda w: w.bridge.vehicle.armed is False, 5)
     station = GroundStation(world)
     for command, params, _ in ALL:
-        station.send(long(command, params))
-        world.run(0.1)
+        station.send(long(command, params), wait_s=0.1)
     assert results(station) == [UNSUPPORTED] * len(ALL)
     assert done(world) == []
 
@@ -138,8 +150,7 @@ def test_an_action_on_a_board_that_falls_silent_fails_and_is_not_repeated() -> N
             world.after(0.0005, hang_once_told)
 
     hang_once_told()
-    station.send(long(*ACCELEROMETER[:2]))
-    world.run(3)
+    station.send(long(*ACCELEROMETER[:2]), wait_s=3)
     assert hung
     assert results(station) == [FAILED]
     assert station.texts()[0] == "Accel calibration failed: no answer"
@@ -152,8 +163,7 @@ def test_despite_lost_bytes_an_action_is_done_at_most_once() -> None:
     for seed in seeds(4):
         world, station = a_world(SimOptions(seed=seed))
         world.faults.lost_byte_rate = 0.02
-        station.send(long(*COMPASS[:2]))
-        world.run(4)
+        station.send(long(*COMPASS[:2]), wait_s=4)
         assert len(done(world)) <= 1
         assert results(station) in ([IN_PROGRESS], [FAILED])
 
@@ -162,8 +172,7 @@ def test_a_repeated_command_is_answered_in_progress() -> None:
     world, station = a_world()
     for _ in range(3):
         station.send(long(*ACCELEROMETER[:2]))
-    station.send(long(*COMPASS[:2]))
-    world.run(0.6)
+    station.send(long(*COMPASS[:2]), wait_s=0.6)
     assert results(station) == [IN_PROGRESS, IN_PROGRESS, TEMPORARILY_REJECTED, IN_PROGRESS]
     assert done(world) == [205]
 
@@ -171,39 +180,11 @@ def test_a_repeated_command_is_answered_in_progress() -> None:
 def test_no_action_runs_during_a_mission_transfer() -> None:
     world, station = a_world()
     outcome = world.push(waypoints(100))
-    station.send(long(*COMPASS[:2]))
-    world.run(0.05)
+    station.send(long(*COMPASS[:2]), wait_s=0.05)
     assert results(station) == [TEMPORARILY_REJECTED]
     assert station.texts() == ["Compass calibration failed: a transfer is running"]
     world.wait_until(lambda _: bool(outcome), 5)
     assert " stored: " in outcome[0][0].text
-    assert done(world) == []
-
-
-def test_calibrating_a_missing_sensor_is_denied(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simulator.board.msp_port.SensorReplies", partial(SensorReplies, sensors=0b1011))
-    world, station = a_world()
-    station.send(long(*COMPASS[:2]))
-    world.run(0.3)
-    assert results(station) == [DENIED]
-    assert station.texts() == ["Compass calibration failed: no such sensor"]
-    assert done(world) == []
-
-
-@pytest.mark.parametrize(
-    ("command", "params"),
-    [
-        (CALIBRATION, (0, 0, 0, 1, 0, 0, 0)),  # radio control
-        (CALIBRATION, (0, 1, 0, 0, 1, 0, 0)),  # two at once
-        (CALIBRATION, (0, 0, 0, 0, 0, 0, 0)),
-        (CALIBRATION, (math.nan, 0, 0, 0, 0, 0, 0)),
-    ],
-)
-def test_other_actions_are_unsupported(command: int, params: tuple[float, ...]) -> None:
-    world, station = a_world()
-    station.send(long(command, params))
-    world.run(0.3)
-    assert results(station) == [UNSUPPORTED]
     assert done(world) == []
 
 
@@ -228,17 +209,15 @@ def test_no_other_command_reaches_the_flight_controller() -> None:
 
 @pytest.mark.parametrize("current", [2, 3])
 def test_a_guided_item_is_refused_at_once(current: int) -> None:
-    world, station = a_world()
+    _world, station = a_world()
     here = (45.3838, 8.4733, 20.0)
-    station.send(m.MAVLink_mission_item_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *here))
-    world.run(0.1)
+    station.send(m.MAVLink_mission_item_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *here), wait_s=0.1)
     (ack,) = station.messages("MISSION_ACK")
     assert station.is_target_of(ack)
     assert ack.type == m.MAV_MISSION_DENIED
     assert "transmitter" in station.texts()[0]
     station.take()
     e7 = (453838000, 84733000, 20.0)
-    station.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *e7))
-    world.run(0.1)
+    station.send(m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, current, 0, 0, 0, 0, 0, *e7), wait_s=0.1)
     assert [ack.type for ack in station.messages("MISSION_ACK")] == [m.MAV_MISSION_DENIED]
     assert station.texts() == []

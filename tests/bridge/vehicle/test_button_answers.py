@@ -40,8 +40,7 @@ def connected(kind: str = "naze", heartbeat: Message = QGC_HEARTBEAT) -> tuple[W
     world = World(speeds=(115200,), peer=peer)
     world.run(15) if peer else world.wait_ready()
     station = GroundStation(world)
-    station.send(heartbeat)
-    world.run(5)
+    station.send(heartbeat, wait_s=5)
     station.take()
     return world, station
 
@@ -52,9 +51,8 @@ def command(number: int) -> Message:
 
 @pytest.mark.parametrize("action", ACTIONS)
 def test_every_action_is_answered_by_a_text(action: str) -> None:
-    world, station = connected()
-    station.send(command(ACTIONS[action]))
-    world.run(0.5)
+    _world, station = connected()
+    station.send(command(ACTIONS[action]), wait_s=0.5)
     assert station.messages("COMMAND_ACK")[0].result in (m.MAV_RESULT_DENIED, m.MAV_RESULT_UNSUPPORTED)
     (text,) = station.messages("STATUSTEXT")
     assert text.severity <= m.MAV_SEVERITY_WARNING
@@ -67,8 +65,7 @@ def test_a_refusal_in_qgroundcontrol_is_a_dialog_without_a_banner() -> None:
     station.heartbeat = QGC_HEARTBEAT
     world.run(2)
     began = world.now
-    station.send(command(m.MAV_CMD_COMPONENT_ARM_DISARM))
-    world.run(5)
+    station.send(command(m.MAV_CMD_COMPONENT_ARM_DISARM), wait_s=5)
     assert (screen.banners, screen.heard(began)[0]) == ([], "Arm and disarm with the transmitter")
 
 
@@ -94,9 +91,8 @@ def test_both_messages_of_a_button_of_mission_planner_have_the_same_answer(numbe
 
 @pytest.mark.parametrize("number", [519, 521, 525, 2504])
 def test_a_programs_own_requests_are_refused_silently(number: int) -> None:
-    world, station = connected()
-    station.send(command(number))
-    world.run(0.5)
+    _world, station = connected()
+    station.send(command(number), wait_s=0.5)
     assert station.messages("COMMAND_ACK")[0].result == m.MAV_RESULT_UNSUPPORTED
     assert station.texts() == []
 
@@ -117,14 +113,12 @@ def test_a_programs_own_requests_are_refused_silently(number: int) -> None:
 )
 def test_messages_without_an_acknowledgement_are_answered_once(message: Message, text: str) -> None:
     """A joystick sends 50 a second, and must not use up what the station may still ask for."""
-    world, station = connected()
+    _world, station = connected()
     for _ in range(300):
-        station.send(message)
-        world.run(0.02)
+        station.send(message, wait_s=0.02)
     assert station.texts() == [text]
     station.take()
-    station.send(list_message())
-    world.run(1)
+    station.send(list_message(), wait_s=1)
     assert station.messages("MISSION_COUNT")
 
 
@@ -135,8 +129,7 @@ def test_a_plan_with_only_a_fence_clears_the_mission_with_two_notes() -> None:
     assert Upload(station, items).run() is MissionResult.ACCEPTED
     world.run(12)
     station.take()
-    station.send(count_message(0))
-    world.run(3)
+    station.send(count_message(0), wait_s=3)
     assert {ack.type for ack in station.messages("MISSION_ACK")} == {MissionResult.ACCEPTED}
     said = station.texts()
     assert said[0] == "Plan without waypoints: fences are not stored here"
@@ -152,8 +145,7 @@ def test_reading_a_missing_mission_returns_an_empty_list_and_the_reason(kind: st
         world.power_off()
         world.run(10)
         station.take()
-    station.send(list_message())
-    world.run(1)
+    station.send(list_message(), wait_s=1)
     (count,) = station.messages("MISSION_COUNT")
     assert count.count <= 1
     assert station.messages("MISSION_ACK") == []
@@ -188,8 +180,7 @@ def test_resume_mission_names_the_way_back() -> None:
 def test_a_sender_that_is_not_heard_is_counted_with_the_reason(ids: tuple[int, int], component: int, why: str) -> None:
     world, _ = connected()
     station = GroundStation(world, "other", sysid=ids[0], compid=ids[1])
-    station.send(QGC_HEARTBEAT)
-    world.run(1)
+    station.send(QGC_HEARTBEAT, wait_s=1)
     for _ in range(3):
         station.send(m.MAVLink_mission_count_message(1, component, 3))
     world.run(1)

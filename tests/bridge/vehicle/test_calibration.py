@@ -17,7 +17,7 @@ from simulator.board.options import Faults, SimOptions
 from simulator.commands.fc_kinds import make_board
 from tests.support.fake_inav import FakeInav
 from tests.support.screens import Screens
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, ready_world
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED, IN_PROGRESS = range(6)
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
@@ -29,8 +29,7 @@ class CalibrationPages:
     """The two pages, on a station of a simulated world."""
 
     def __init__(self, peer: Any = None, faults: Faults | None = None) -> None:
-        self.world = World(SimOptions(), faults, speeds=(115200,), peer=peer)
-        self.world.wait_ready()
+        self.world = ready_world(SimOptions(), faults, peer=peer)
         self.station = GroundStation(self.world)
         self.station.stay_connected()
         self.world.run(4)

@@ -151,9 +151,8 @@ def test_commands_that_act_on_the_aircraft_are_denied_with_a_reason(
     ids=lambda message: message.get_type(),
 )
 def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
-    world, asking, other = two_stations()
-    asking.send(refused)
-    world.run(3)
+    _world, asking, other = two_stations()
+    asking.send(refused, wait_s=3)
     assert asking.texts()
     assert other.texts() == []
 
@@ -161,8 +160,7 @@ def test_only_the_sender_gets_the_refusal(refused: Message) -> None:
 def test_the_current_waypoint_cannot_be_set() -> None:
     """A MISSION_CURRENT would be another request to MAVSDK, which requests no streams."""
     world, asking, other = two_stations()
-    asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
-    world.run(3)
+    asking.send(m.MAVLink_mission_set_current_message(1, 1, 3), wait_s=3)
     assert "This flight controller cannot fly missions" in asking.texts()
     assert asking.messages("MISSION_CURRENT") == []
     assert len(other.messages("MISSION_CURRENT")) == 3
@@ -173,13 +171,11 @@ def test_the_current_waypoint_cannot_be_set() -> None:
 def test_set_wp_in_mission_planner_ends_at_once() -> None:
     """Without one MISSION_CURRENT its window hangs for 12 s, while it repeats the request six times."""
     world, asking, other = two_stations()
-    asking.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTENDED_STATUS, 2, 1))
-    world.run(5)
+    asking.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_EXTENDED_STATUS, 2, 1), wait_s=5)
     for _ in range(2):
         asking.take()
         other.take()
-        asking.send(m.MAVLink_mission_set_current_message(1, 1, 3))
-        world.run(0.1)
+        asking.send(m.MAVLink_mission_set_current_message(1, 1, 3), wait_s=0.1)
         answers = [message.get_type() for message in asking.messages("STATUSTEXT", "MISSION_CURRENT")]
         assert answers[:2] == ["STATUSTEXT", "MISSION_CURRENT"]
         assert not any("cannot fly missions" in text for text in other.texts())

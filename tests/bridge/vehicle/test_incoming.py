@@ -27,7 +27,7 @@ from tests.support.conversations import (
     waypoints,
 )
 from tests.support.seeds import seeds
-from tests.support.world import GroundStation, Radio, World
+from tests.support.world import GroundStation, Radio, World, ready_world
 
 KEY = key_from_passphrase("a passphrase")
 OTHER_KEY = key_from_passphrase("another passphrase")
@@ -84,9 +84,7 @@ def signing() -> Signing:
 
 def keyed(given: Signing | None = None) -> World:
     """A world whose only link requires a key."""
-    world = World(speeds=(115200,), links={"udp": LinkAccess(given or signing(), LINK_ID)})
-    world.wait_ready()
-    return world
+    return ready_world(links={"udp": LinkAccess(given or signing(), LINK_ID)})
 
 
 def signing_station(world: World, name: str = "gcs", *, at: int = ticks(NOON), sysid: int = 255) -> GroundStation:
@@ -120,8 +118,7 @@ def refusals(world: World) -> dict[str, int]:
 def test_messages_that_change_something_must_be_signed(message: Message, answer: str | None, version: int) -> None:
     world = keyed()
     station = GroundStation(world, version=version)
-    station.send(message)
-    world.run(0.01)
+    station.send(message, wait_s=0.01)
     assert refusals(world) == {"not signed": 1}
     types = [message.get_type() for message in station.messages() if message.get_type() in ANSWERS]
     assert types == ([] if answer is None else [answer])
@@ -192,8 +189,7 @@ def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
     unheard = GroundStation(world, "unheard")
     world.bridge.add_default_peer(unheard.peer, until_answered=False)
     old = GroundStation(world, "old", version=1)
-    old.send(READS[0])
-    world.run(3)
+    old.send(READS[0], wait_s=3)
     for station in (unheard, old):
         assert station.messages("HEARTBEAT")
         assert all(frame[0] == 0xFD and frame[2] & 1 for frame in station.frames)
@@ -230,20 +226,16 @@ def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
     world = keyed()
     station, right = signing_station(world), signing_station(world, "right clock", sysid=254)
     if was_right:
-        station.send(clear_message())
-        world.run(1)
+        station.send(clear_message(), wait_s=1)
         assert [ack.type for ack in station.take("MISSION_ACK")] == [MissionResult.ACCEPTED]
     station.sign(KEY, ticks(NOON) + 2 * 86400 * 100_000)
     for _ in range(3):
-        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        world.run(1)
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=1)
     assert station.texts() == []
-    station.send(clear_message())
-    world.run(0.1)
+    station.send(clear_message(), wait_s=0.1)
     assert [ack.type for ack in station.messages("MISSION_ACK")] == [MissionResult.DENIED]
     assert station.texts() == ["Refused: signed over a day ahead: set the clocks"]
-    right.send(clear_message())
-    world.run(1)
+    right.send(clear_message(), wait_s=1)
     assert [ack.type for ack in right.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
 
 
@@ -253,8 +245,7 @@ def test_a_refusal_of_rates_is_silent() -> None:
     station = GroundStation(world)
     station.send(mavlink.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0))
     station.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
-    station.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 30, 100_000, 0, 0, 0, 0, 0))
-    world.run(0.1)
+    station.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 30, 100_000, 0, 0, 0, 0, 0), wait_s=0.1)
     assert refusals(world) == {"not signed": 3}
     assert station.texts() == []
     assert world.events("gcs.refused") == []
@@ -262,8 +253,7 @@ def test_a_refusal_of_rates_is_silent() -> None:
 
 @pytest.mark.parametrize("access", [LinkAccess(signing(), LINK_ID), LinkAccess(may_write=lambda peer: "pilot" in peer)])
 def test_texts_for_others_do_not_reach_a_listener(access: LinkAccess) -> None:
-    world = World(speeds=(115200,), links={"udp": access})
-    world.wait_ready()
+    world = ready_world(links={"udp": access})
     pilot = signing_station(world, "pilot")
     listener = GroundStation(world, "listener", sysid=250)
     for station in (pilot, listener):
@@ -294,12 +284,10 @@ def test_an_address_must_show_the_key_again_after_the_station_has_left() -> None
     station, another = signing_station(world), GroundStation(world, sysid=250)
     assert another.peer == station.peer
     for times in (1, 2):
-        another.send(clear_message())
-        world.run(0.1)
+        another.send(clear_message(), wait_s=0.1)
         assert [ack.type for ack in another.messages("MISSION_ACK")] == [MissionResult.DENIED] * times
         assert another.texts() == ["Refused: not signed"] * times
-        station.send(READS[0])
-        world.run(0.1)
+        station.send(READS[0], wait_s=0.1)
         world.bridge.gcs_gone(station.peer, world.now)
 
 
@@ -352,8 +340,7 @@ def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
 
 @pytest.mark.parametrize("seed", seeds(2))
 def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> None:
-    world = World(seed=seed, speeds=(115200,), links={"udp": LinkAccess(signing(), LINK_ID)})
-    world.wait_ready()
+    world = ready_world(seed=seed, links={"udp": LinkAccess(signing(), LINK_ID)})
     station = GroundStation(world, radio=Radio(loss=0.05, repeat=0.3, delay_s=0.02))
     station.sign(KEY, ticks(NOON))
     assert Upload(station, waypoints(30)).run() is MissionResult.ACCEPTED
@@ -366,8 +353,7 @@ def test_a_signed_upload_over_a_network_that_loses_and_duplicates(seed: int) -> 
 
 
 def test_an_unlisted_address_may_only_read() -> None:
-    world = World(speeds=(115200,), links={"udp": LinkAccess(may_write=lambda peer: peer.key == "pilot")})
-    world.wait_ready()
+    world = ready_world(links={"udp": LinkAccess(may_write=lambda peer: peer.key == "pilot")})
     pilot, guest = GroundStation(world, "pilot"), GroundStation(world, "guest", sysid=250)
     assert Upload(pilot, waypoints(6)).run() is MissionResult.ACCEPTED
     assert Upload(guest, waypoints(3)).run() is MissionResult.DENIED
@@ -379,16 +365,14 @@ def test_an_unlisted_address_may_only_read() -> None:
 
 def test_with_a_key_and_a_list_both_are_required() -> None:
     access = LinkAccess(signing(), LINK_ID, lambda peer: peer.key == "pilot")
-    world = World(speeds=(115200,), links={"udp": access})
-    world.wait_ready()
+    world = ready_world(links={"udp": access})
     assert Upload(signing_station(world, "guest", sysid=250), waypoints(3)).run() is MissionResult.DENIED
     assert Upload(GroundStation(world, "pilot"), waypoints(3)).run() is MissionResult.DENIED
     assert Upload(signing_station(world, "pilot"), waypoints(3)).run() is MissionResult.ACCEPTED
 
 
 def test_a_link_without_access_rules_is_open() -> None:
-    world = World(speeds=(115200,), links={"another": LinkAccess(may_write=lambda _: False)})
-    world.wait_ready()
+    world = ready_world(links={"another": LinkAccess(may_write=lambda _: False)})
     assert Upload(GroundStation(world), waypoints(3)).run() is MissionResult.ACCEPTED
 
 
@@ -415,8 +399,7 @@ def test_a_refusal_has_the_autopilots_ids() -> None:
     world, _ = passing({"udp": LinkAccess(may_write=lambda _: False)}, sysid=42)
     station = GroundStation(world)
     station.send(mavlink.MAVLink_command_long_message(42, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
-    station.send(mavlink.MAVLink_command_long_message(77, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
-    world.run(0.01)
+    station.send(mavlink.MAVLink_command_long_message(77, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), wait_s=0.01)
     (ack,) = station.messages("COMMAND_ACK")
     assert (ack.get_srcSystem(), ack.get_srcComponent(), ack.result) == (42, 1, mavlink.MAV_RESULT_DENIED)
     assert refusals(world) == {"this address may only read": 2}
@@ -462,8 +445,7 @@ def test_setup_signing_is_never_forwarded(access: LinkAccess) -> None:
     setup = mavlink.MAVLink_setup_signing_message(1, 1, KEY, 1)
     station.send(setup)
     station.sign(KEY, ticks(NOON))
-    station.send(setup)
-    world.run(0.1)
+    station.send(setup, wait_s=0.1)
     assert bytes(autopilot.received) == b""
     assert sum(refusals(world).values()) == 2
     assert "Refused: set the key in naze-bridge's settings" in station.texts()

@@ -7,7 +7,7 @@ from protocols.msp.nav import NavAction, NavMode, NavState
 from simulator.board.options import Faults, SimOptions, Tree
 from tests.bridge.fc.test_msp_telemetry import flown, listening, m
 from tests.bridge.vehicle.test_item_numbers import bench
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 ANGLE, BARO, GPS_HOME, GPS_HOLD, GPS_AUTO = 1 << 0, 1 << 2, 1 << 6, 1 << 7, 1 << 8
 
@@ -75,8 +75,7 @@ def test_a_heartbeat_is_sent_with_a_poll() -> None:
 @pytest.mark.parametrize("tree", Tree)
 def test_home_before_arming_is_the_position(tree: Tree) -> None:
     """HarakiriWebstore1 reports an unknown home as 190 degrees, TestCode3 as 0."""
-    world = World(SimOptions(tree=tree), speeds=(115200,))
-    world.wait_ready()
+    world = ready_world(SimOptions(tree=tree))
     station = listening(world)
     world.run(3)
     home = station.messages("HOME_POSITION")[-1]

@@ -72,10 +72,7 @@ STATES: dict[str, tuple[Callable[[], World], Told]] = {
         calibrating,
         Told(m.MAV_STATE_CALIBRATING, False, "PreArm: calibrating: wait until it is done", "calibrating", CALIBRATING),
     ),
-    "unknown": (
-        lambda: naze(powered=False, seconds=2.0),
-        Told(m.MAV_STATE_UNINIT, False, None, "unknown", NO_LINK),
-    ),
+    "unknown": (lambda: naze(powered=False, seconds=2.0), Told(m.MAV_STATE_UNINIT, False, None, "unknown", NO_LINK)),
     "never found": (
         lambda: naze(powered=False),
         Told(m.MAV_STATE_CRITICAL, False, "PreArm: no flight controller: check power, wiring", "never found", NO_LINK),
@@ -88,8 +85,7 @@ def test_every_client_gets_the_same_state(name: str) -> None:
     make, expected = STATES[name]
     world = make()
     station = GroundStation(world)
-    station.send(QGC_HEARTBEAT)
-    world.run(1.5)
+    station.send(QGC_HEARTBEAT, wait_s=1.5)
     status = station.messages("SYS_STATUS")[-1]
     refusal = None
     if expected.refusal is not None:
@@ -126,8 +122,7 @@ def test_the_end_of_all_reasons_is_info_for_qgroundcontrol() -> None:
     """Which takes each text that begins with PreArm for one."""
     world = blocked()
     station = GroundStation(world)
-    station.send(QGC_HEARTBEAT)
-    world.run(2)
+    station.send(QGC_HEARTBEAT, wait_s=2)
     world.faults.arming_blockers = 0
     world.run(3)
     assert station.texts() == ["PreArm: no RC link", "Ready to arm"]
@@ -157,8 +152,7 @@ def test_the_charge_of_a_lost_craft_is_the_last_known() -> None:
     """Mission Planner shows MAVLink's unknown as 0 %."""
     world = naze()
     station = GroundStation(world)
-    station.send(QGC_HEARTBEAT)
-    world.run(3)
+    station.send(QGC_HEARTBEAT, wait_s=3)
     before = station.messages("SYS_STATUS")[-1].battery_remaining
     assert before > 0
     world.power_off()

@@ -21,7 +21,7 @@ from simulator.commands.fc_kinds import make_board
 from simulator.inav.boxes import BOXES
 from tests.support.conversations import Download, Upload
 from tests.support.fake_inav import FAKE, FakeInav
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 ACCEPTED, DENIED, FAILED = 0, 2, 4
 SET_CURRENT = m.MAV_CMD_DO_SET_MISSION_CURRENT
@@ -60,8 +60,7 @@ class Flight:
 
     def __init__(self, items: Sequence[MissionItem] = MISSION, *, links: Any = None, **options: Any) -> None:
         self.board: MspBoard = make_board("inav", MspOptions(**options), Faults(boxes=0))
-        self.world = World(speeds=(115200,), peer=self.board, links=LINKS if links is None else links)
-        self.world.wait_ready(10)
+        self.world = ready_world(peer=self.board, links=LINKS if links is None else links, within_s=10)
         self.world.run(2)
         self.station = GroundStation(self.world)
         if links is None:
@@ -294,18 +293,15 @@ def test_an_unknown_mission_is_not_sent() -> None:
     world.wait_until(lambda world: world.is_found, 10)
     world.run(1)
     station = GroundStation(world)
-    station.send(long(1))
-    world.run(0.5)
+    station.send(long(1), wait_s=0.5)
     assert (results(station), station.texts()) == ([DENIED], ["Set WP: read the mission from the board first"])
     assert 0x2221 not in inav.commands
 
 
 def test_other_boards_refuse_it_as_before() -> None:
     board = make_board("multiwii", MspOptions(), Faults(boxes=0))
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready(10)
+    world = ready_world(peer=board, within_s=10)
     world.run(2)
     station = GroundStation(world)
-    station.send(long(1))
-    world.run(0.5)
+    station.send(long(1), wait_s=0.5)
     assert (results(station), station.texts()) == ([DENIED], ["Use the MISSION switch to fly the mission"])

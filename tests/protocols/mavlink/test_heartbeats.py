@@ -5,12 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from protocols.mavlink.dialect import MESSAGE_FORMATS
-from protocols.mavlink.frame import (
-    MavlinkFrame,
-    is_autopilot_heartbeat,
-    is_disarmed_heartbeat,
-    is_plausible_heartbeat,
-)
+from protocols.mavlink.frame import MavlinkFrame, is_autopilot_heartbeat, is_disarmed_heartbeat, is_plausible_heartbeat
 
 #: Custom mode, type, autopilot, base mode, state, version.
 GOOD = bytes((0, 0, 0, 0, 2, 3, 81, 3, 3))

@@ -11,14 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from protocols.mavlink.codec import FrameWriter
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
-from protocols.mavlink.signing import (
-    Check,
-    SignedPeer,
-    Signing,
-    Timestamps,
-    key_from_passphrase,
-    ticks,
-)
+from protocols.mavlink.signing import Check, SignedPeer, Signing, Timestamps, key_from_passphrase, ticks
 from tests.support.packing import pack
 
 #: MAVLink's signing: ticks of 10 us, and the greatest lag of a new stream, one minute.
@@ -128,8 +121,7 @@ def test_each_stream_has_its_own_timestamps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lag", "expected"),
-    [(0, Check.VALID), (TOLERANCE, Check.VALID), (TOLERANCE + 1, Check.LATE), (-DAY, Check.VALID)],
+    ("lag", "expected"), [(0, Check.VALID), (TOLERANCE, Check.VALID), (TOLERANCE + 1, Check.LATE), (-DAY, Check.VALID)]
 )
 def test_a_new_stream_is_at_most_a_minute_behind_us(lag: int, expected: Check) -> None:
     assert our_side().check(frame_of(pymavlink_side(timestamp=ticks(NOON) - lag))) is expected

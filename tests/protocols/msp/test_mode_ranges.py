@@ -25,11 +25,7 @@ def test_a_mode_is_shown_with_channel_and_pulses() -> None:
     ]  # fmt: skip
 
 
-@given(
-    held=st.lists(HELD, min_size=8, max_size=8),
-    wanted=RANGES,
-    number=st.integers(1, 3),
-)
+@given(held=st.lists(HELD, min_size=8, max_size=8), wanted=RANGES, number=st.integers(1, 3))
 def test_writing_a_modes_ranges_leaves_other_modes(
     held: list[bytes], wanted: list[tuple[int, int, int]], number: int
 ) -> None:

@@ -12,13 +12,13 @@ import pytest
 
 from bridge.missions.fc_mission_store import PushFailure
 from bridge.missions.mission_service import DeliveryResult, HeldMission
-from bridge.model.missions import ARMED, Refusal
+from bridge.model.missions import ARMED
 from protocols.mission_item import MissionResult
 from protocols.msp.mission import MissionCommand
 from simulator.board.options import Faults, SimOptions
 from tests.support.conversations import records_of, waypoints
 from tests.support.seeds import seeds
-from tests.support.world import World, flash_holding
+from tests.support.world import World, flash_holding, ready_world
 
 OLD = waypoints(20, seed=77)
 NEW = waypoints(146, seed=5)
@@ -32,8 +32,7 @@ Injection = Callable[[World, random.Random], None]
 
 def holding_the_old_list(seed: int, options: SimOptions | None = None) -> World:
     options = options or SimOptions(seed=seed, boot_ms=500)
-    world = World(options, seed=seed, speeds=(115200,), flash=OLD_FLASH)
-    world.wait_ready()
+    world = ready_world(options, seed=seed, flash=OLD_FLASH)
     assert world.stored == OLD_RECORDS
     return world
 
@@ -43,9 +42,7 @@ def push_under(inject: Injection, seed: int, options: SimOptions | None = None) 
     world = holding_the_old_list(seed, options)
     world.written.clear()
     inject(world, random.Random(seed))
-    outcome = world.push(NEW)
-    world.wait_until(lambda _: bool(outcome), 90)
-    result, _ = outcome[0]
+    result = world.pushed(NEW, 90)
     stored = world.stored
     committed = MissionCommand.COMMIT in [frame.command for frame in world.requests()]
     if isinstance(result, DeliveryResult) and result.ack is MissionResult.ACCEPTED:
@@ -74,9 +71,7 @@ def works_again(world: World) -> None:
     world.power_on()
     world.run(3)
     world.wait_until(lambda w: w.is_found, 5)
-    outcome = world.push(NEW)
-    world.wait_until(lambda _: bool(outcome), 5)
-    assert outcome[0][0].ack is MissionResult.ACCEPTED
+    assert world.pushed(NEW, 5).ack is MissionResult.ACCEPTED
     assert world.stored == NEW_RECORDS
     assert world.naze.counters.hazard_runs == 0 or world.faults.bit_error_rate
 
@@ -133,9 +128,7 @@ def test_a_repeated_push_continues_where_it_ended() -> None:
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = 1e-3
         for _ in range(3):
-            outcome = world.push(NEW)
-            world.wait_until(lambda _, outcome=outcome: bool(outcome), 4.9)  # type: ignore[misc]
-            if outcome[0][0].ack is MissionResult.ACCEPTED:
+            if world.pushed(NEW, 4.9).ack is MissionResult.ACCEPTED:
                 break
             assert world.stored == OLD_RECORDS
         assert world.stored == NEW_RECORDS
@@ -146,10 +139,8 @@ def test_a_push_over_a_bad_line_ends_before_mission_planner_times_out(rate: floa
     for seed in range(3):
         world = holding_the_old_list(seed)
         world.faults.bit_error_rate = rate
-        outcome = world.push(NEW)
-        world.wait_until(lambda _, outcome=outcome: bool(outcome), 4.9)  # type: ignore[misc]
-        result, _ = outcome[0]
-        assert world.stored == (NEW_RECORDS if result.ack is MissionResult.ACCEPTED else OLD_RECORDS)
+        is_accepted = world.pushed(NEW, 4.9).ack is MissionResult.ACCEPTED
+        assert world.stored == (NEW_RECORDS if is_accepted else OLD_RECORDS)
 
 
 def test_a_damaged_reply_is_not_trusted() -> None:
@@ -164,16 +155,13 @@ def test_a_pull_over_a_bad_line_is_exact_or_fails() -> None:
     held = 0
     for seed in seeds(8):
         world = holding_the_old_list(seed)
-        outcome = world.push(NEW)
-        world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
+        world.pushed(NEW, 5)
         world.faults.bit_error_rate = 4e-4
         world.inside.missions.held = None
-        answers: list[HeldMission | Refusal] = []
-        world.bridge.missions.pull(answers.append, world.now)
-        world.wait_until(lambda _, answers=answers: bool(answers), 60)  # type: ignore[misc]
-        if isinstance(answers[0], HeldMission):
+        answer = world.pull()
+        if isinstance(answer, HeldMission):
             held += 1
-            assert answers[0].records == NEW_RECORDS
+            assert answer.records == NEW_RECORDS
     assert held >= 2
 
 
@@ -264,11 +252,7 @@ def test_a_board_that_becomes_busy_during_a_push_keeps_the_old_list() -> None:
 
 def test_a_refusal_for_flash_wear_is_not_reported_as_busy() -> None:
     world = holding_the_old_list(0)
-    results = []
-    for seed in range(251):
-        outcome = world.push(waypoints(2, seed=1000 + seed))
-        world.wait_until(lambda _, outcome=outcome: bool(outcome), 20)  # type: ignore[misc]
-        results.append(outcome[0][0])
+    results = [world.pushed(waypoints(2, seed=1000 + seed)) for seed in range(251)]
     assert [result.ack for result in results] == [MissionResult.ACCEPTED] * 250 + [MissionResult.DENIED]
     assert results[-1].text == PushFailure.WRITES_SPENT.value.text
     assert world.stored == records_of(waypoints(2, seed=1249))
@@ -289,18 +273,14 @@ def test_an_identical_list_is_not_written_again() -> None:
     world = holding_the_old_list(0)
     writes, operations = world.naze.counters.flash_writes, world.naze.flash_operations
     for _ in range(3):
-        outcome = world.push(OLD)
-        world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
-        assert outcome[0][0].text.startswith("20 of 20 unchanged: ")
+        assert world.pushed(OLD, 5).text.startswith("20 of 20 unchanged: ")
     assert (world.naze.counters.flash_writes, world.naze.flash_operations) == (writes, operations)
 
 
 def test_an_empty_list_is_not_cleared_again() -> None:
     world = holding_the_old_list(0)
     for expected in ("Mission on the flight controller cleared", "No mission to clear on the flight controller"):
-        outcome = world.push([])
-        world.wait_until(lambda _, outcome=outcome: bool(outcome), 5)  # type: ignore[misc]
-        assert outcome[0][0].text == expected
+        assert world.pushed([], 5).text == expected
         assert world.stored == ()
     assert world.naze.counters.flash_writes == 2
 

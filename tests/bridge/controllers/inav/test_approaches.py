@@ -8,13 +8,7 @@ import pytest
 
 from protocols.mission_item import Command, MissionResult
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.inav_places import (
-    FW_APPROACH,
-    SET_FW_APPROACH,
-    SET_SAFEHOME,
-    FwApproach,
-    decode_approach,
-)
+from protocols.msp.inav_places import FW_APPROACH, SET_FW_APPROACH, SET_SAFEHOME, FwApproach, decode_approach
 from simulator.board.msp_board import MspBoard
 from simulator.inav.firmware import InavFirmware
 from simulator.inav.places import InavPlaces
@@ -116,9 +110,7 @@ def test_an_approach_of_a_place_that_is_not_a_rally_point_is_cleared() -> None:
     assert approaches_of(board)[:6] == [FwApproach(number) for number in range(6)]
 
 
-def test_a_refused_rally_point_leaves_the_old_points_with_their_approaches(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_refused_rally_point_leaves_the_old_points_with_their_approaches(monkeypatch: pytest.MonkeyPatch) -> None:
     board, _, station = board_with(version="9.1.0")
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
     set_approaches(board, 0, 1, 2)

@@ -23,7 +23,7 @@ from simulator.inav.boxes import BOXES
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Download, Upload
 from tests.support.seeds import seeds
-from tests.support.world import GroundStation, World
+from tests.support.world import GroundStation, World, ready_world
 
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 MIXED = [
@@ -46,8 +46,7 @@ def board_with(
     kind: str = "inav", faults: Faults | None = None, **options: Any
 ) -> tuple[MspBoard, World, GroundStation]:
     board = make_board(kind, MspOptions(**options), faults or Faults(boxes=0))
-    world = World(speeds=(115200,), peer=board)
-    world.wait_ready(10)
+    world = ready_world(peer=board, within_s=10)
     world.run(2)
     return board, world, GroundStation(world)
 
@@ -145,8 +144,7 @@ def test_polls_to_a_slow_board_are_not_lost() -> None:
     assert world.inside.session.state.link is not None
     lost = world.inside.session.state.link.requests_lost
     for _ in range(5):
-        station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        world.run(1)
+        station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=1)
     assert world.inside.session.state.link.requests_lost == lost
     assert len(station.messages("ATTITUDE")) > 5 * 7
 

@@ -9,14 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame
-from protocols.msp.inav_places import (
-    GEOZONE,
-    GEOZONE_FEATURE,
-    SAFEHOME,
-    SET_GEOZONE,
-    SET_GEOZONE_VERTEX,
-    SET_SAFEHOME,
-)
+from protocols.msp.inav_places import GEOZONE, GEOZONE_FEATURE, SAFEHOME, SET_GEOZONE, SET_GEOZONE_VERTEX, SET_SAFEHOME
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.places import SET_FEATURE
@@ -89,24 +82,22 @@ def test_unchanged_lists_are_not_written_again() -> None:
 
 
 def test_clear_all_clears_missions_fences_and_rally_points_with_one_answer_for_missions() -> None:
-    _, world, station = board_with()
+    _, _world, station = board_with()
     assert Upload(station, plan(4)).run() is ACCEPTED
     assert Upload(station, FENCE_ITEMS, mission_type=FENCE).run() is ACCEPTED
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
     before = len(station.messages("MISSION_ACK"))
-    station.send(clear_message(ALL))
-    world.run(8)
+    station.send(clear_message(ALL), wait_s=8)
     acks = station.messages("MISSION_ACK")[before:]
     assert {(ack.mission_type, ack.type) for ack in acks} == {(ALL, 0), (FENCE, 0), (RALLY, 0)}
     assert read(station, FENCE) == read(station, RALLY) == Download(station).run()[1:] == []
 
 
 def test_one_type_is_cleared_alone() -> None:
-    _, world, station = board_with()
+    _, _world, station = board_with()
     assert Upload(station, FENCE_ITEMS, mission_type=FENCE).run() is ACCEPTED
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
-    station.send(clear_message(FENCE))
-    world.run(5)
+    station.send(clear_message(FENCE), wait_s=5)
     assert read(station, FENCE) == []
     assert read(station, RALLY) == numbered(RALLY_ITEMS)
 
@@ -114,9 +105,8 @@ def test_one_type_is_cleared_alone() -> None:
 def test_capabilities_are_those_of_the_board() -> None:
     fence, rally = messages.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE, messages.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
     for version, kind, bits in (("7.1.2", "inav", rally), ("9.1.0", "inav", fence | rally), ("9.1.0", "multiwii", 0)):
-        _, world, station = board_with(kind, version=version)
-        station.send(messages.MAVLink_autopilot_version_request_message(1, 1))
-        world.run(1)
+        _, _world, station = board_with(kind, version=version)
+        station.send(messages.MAVLink_autopilot_version_request_message(1, 1), wait_s=1)
         (found,) = station.messages("AUTOPILOT_VERSION")[-1:]
         assert found.capabilities & (fence | rally) == bits
 

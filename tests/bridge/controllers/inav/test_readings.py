@@ -25,8 +25,7 @@ FAILSAFE, PLANE_FAILSAFE = (1 << boxes.index(27) for boxes in (BOXES["9.1.0"], P
 
 def introduced(**options: Any) -> tuple[MspBoard, World, GroundStation]:
     board, world, station = board_with(**options)
-    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    world.run(3)
+    station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=3)
     return board, world, station
 
 

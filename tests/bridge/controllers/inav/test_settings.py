@@ -57,14 +57,12 @@ def test_a_list_is_complete_right_after_a_start_if_the_board_is_known() -> None:
     world.wait_until(lambda world: world.is_found, 20)
     station = GroundStation(world)
     station.stay_connected()
-    station.send(m.MAVLink_param_request_list_message(1, 1))
-    world.run(8)
+    station.send(m.MAVLink_param_request_list_message(1, 1), wait_s=8)
     listed = {each.param_id: each.param_value for each in station.messages("PARAM_VALUE")}
     assert len(listed) == station.messages("PARAM_VALUE")[-1].param_count > count - 60
     assert listed["NAV_RTH_ALTITUDE"] == 1000
     assert asked(world) < count
-    station.send(m.MAVLink_param_set_message(1, 1, b"NAV_RTH_ALTITUDE", 1200, 9))
-    world.run(1)
+    station.send(m.MAVLink_param_set_message(1, 1, b"NAV_RTH_ALTITUDE", 1200, 9), wait_s=1)
     assert len(station.messages("PARAM_ERROR")) == 1
     world.run(30)
     (follows,) = [each for each in station.messages("PARAM_VALUE")[len(listed) :] if each.param_value == 1300]

@@ -5,6 +5,7 @@ import random
 import struct
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import pytest
 
@@ -19,8 +20,9 @@ from reports.vehicle_groups import Group
 from tests.support.conversations import Download, Upload, count_message, waypoints
 from tests.support.fake_inav import FakeInav, FakeMultiwii, lossy
 from tests.support.seeds import seeds
-from tests.support.world import GroundStation, Radio, World
+from tests.support.world import GroundStation, Radio, World, ready_world
 
+FakeT = TypeVar("FakeT", bound=FakeInav)
 RULES = NavRules(NavProfile())
 ACCEPTED, DENIED = MissionResult.ACCEPTED, MissionResult.DENIED
 CLEARED = bytes((NavAction.RTH, *bytes(18), LAST))
@@ -39,14 +41,18 @@ def packed(items: list[MissionItem]) -> list[bytes]:
 
 
 def found(peer: FakeInav) -> tuple[World, GroundStation]:
-    world = World(speeds=(115200,), peer=peer)
-    world.wait_ready(5)
+    world = ready_world(peer=peer, within_s=5)
     return world, GroundStation(world)
 
 
+def fresh(make: type[FakeT]) -> tuple[FakeT, World, GroundStation]:
+    """A board that holds no mission, and its world."""
+    board = make()
+    return board, *found(board)
+
+
 def test_a_written_list_is_saved_and_reads_as_sent() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     sent = plan(121)
     assert Upload(station, sent).run() is ACCEPTED
     assert inav.saved == inav.records == packed(sent)
@@ -58,8 +64,7 @@ def test_a_written_list_is_saved_and_reads_as_sent() -> None:
 
 
 def test_each_record_is_read_before_the_next_is_sent() -> None:
-    inav = FakeInav()
-    _, station = found(inav)
+    _, station = found(FakeInav())
     assert Upload(station, plan(30)).run() is ACCEPTED
     mission = [f for f in station.world.requests() if f.command in (Nav.SET_WP, Nav.WP) and f.payload[0] != 0]
     written = [n for n, f in enumerate(mission) if f.command == Nav.SET_WP]
@@ -69,8 +74,7 @@ def test_each_record_is_read_before_the_next_is_sent() -> None:
 
 
 def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     old = plan(12)
     assert Upload(station, old).run() is ACCEPTED
     place = packed(plan(40, 3))[30][1:9]
@@ -91,8 +95,7 @@ def test_a_record_that_is_not_stored_is_noticed_and_the_old_list_restored() -> N
 @pytest.mark.parametrize("first", ["a refused record", "an arming"])
 def test_after_a_failed_upload_the_next_failure_restores_the_old_list_too(first: str) -> None:
     """A MultiWii's list is not read again after a failure, so the bridge must remember it."""
-    board = FakeMultiwii()
-    world, station = found(board)
+    board, world, station = fresh(FakeMultiwii)
     old = plan(12)
     assert Upload(station, old).run() is ACCEPTED
     if first == "an arming":
@@ -138,8 +141,7 @@ def test_losses_only_delay_the_upload(make: Callable[[], FakeInav]) -> None:
 @pytest.mark.parametrize("loss", ["request", "reply"])
 def test_one_lost_frame_costs_less_than_two_seconds(loss: str) -> None:
     """The longest is SAVE's: a second, in which a board may write its flash."""
-    inav = FakeInav()
-    world, _ = found(inav)
+    inav, world, _ = fresh(FakeInav)
     draw = random.Random(5)
     for seed in seeds(8):
         lost = draw.choice((Nav.SET_WP, Nav.WP, Nav.GETINFO, Nav.SAVE))
@@ -157,8 +159,7 @@ def test_one_lost_frame_costs_less_than_two_seconds(loss: str) -> None:
 
 
 def test_the_arming_state_is_read_before_a_transfer() -> None:
-    inav = FakeInav()
-    world, _ = found(inav)
+    inav, world, _ = fresh(FakeInav)
     upload = Upload(GroundStation(world, "far", radio=Radio(delay_s=0.02)), plan(10))
     world.run_until(lambda _: len(upload.requested) == 10, 5)
     inav.armed = True
@@ -168,8 +169,7 @@ def test_the_arming_state_is_read_before_a_transfer() -> None:
 
 
 def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     assert Upload(station, plan(10)).run() is ACCEPTED
     upload = Upload(station, plan(60, 1))
     honest = inav.store
@@ -187,8 +187,7 @@ def test_after_arming_during_a_transfer_the_last_record_is_not_sent() -> None:
 
 
 def test_a_save_that_fails_is_reported() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     inav.save = lambda: None  # type: ignore[method-assign]
     assert Upload(station, plan(10)).run() is DENIED
     assert "not saved" in world.store.missions[-1][1].detail  # type: ignore[union-attr]
@@ -197,10 +196,9 @@ def test_a_save_that_fails_is_reported() -> None:
 
 def test_a_cleared_list_is_one_return_home_and_reads_as_empty() -> None:
     for board in (FakeInav(), FakeMultiwii()):
-        world, station = found(board)
+        _world, station = found(board)
         assert Upload(station, plan(10)).run() is ACCEPTED
-        station.send(count_message(0))
-        world.run(3)
+        station.send(count_message(0), wait_s=3)
         assert (board.flown if isinstance(board, FakeMultiwii) else board.saved) == [CLEARED]
         download = Download(station)
         assert download.run()[1:] == []
@@ -211,8 +209,7 @@ def test_a_cleared_list_is_one_return_home_and_reads_as_empty() -> None:
 
 
 def test_a_link_lost_during_a_transfer_is_reported_and_the_next_upload_works() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     upload = Upload(station, plan(60))
     world.run_until(lambda _: len(inav.records) == 25, 5)
     world.unplug()
@@ -247,8 +244,7 @@ def test_a_frame_that_may_have_lost_the_header_is_followed_by_a_harmless_request
 
 def test_a_reply_for_home_is_not_mistaken_for_a_written_record() -> None:
     """Telemetry reads home with the same command."""
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     upload = Upload(station, plan(40))
     home = MspFrame(Direction.REPLY, Nav.WP, b"\0" + inav.read(0)).encode()
     while not upload.is_over:
@@ -273,8 +269,7 @@ def test_a_crashing_record_is_not_written_back() -> None:
 
 
 def test_a_list_replaced_by_another_program_is_not_restored() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     assert Upload(station, plan(12)).run() is ACCEPTED
     inav.records = [*packed(plan(5))]
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP and frame.payload[0] == 3 else ""
@@ -292,8 +287,7 @@ def test_a_save_whose_reply_is_lost_is_repeated() -> None:
 
 
 def test_if_the_first_record_is_lost_the_old_list_is_reported_kept() -> None:
-    inav = FakeInav()
-    world, station = found(inav)
+    inav, world, station = fresh(FakeInav)
     assert Upload(station, plan(12)).run() is ACCEPTED
     inav.drop = lambda frame: "request" if frame.command == Nav.SET_WP else ""
     assert Upload(station, plan(10, 1)).run() is DENIED

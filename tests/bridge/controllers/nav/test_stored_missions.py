@@ -41,8 +41,7 @@ class Bench:
         self.board: MspBoard = make_board("inav", MspOptions(), self.faults, memoryview(self.eeprom))
         self.world = World(speeds=(115200,), peer=self.board, plugged=False)
         self.station = GroundStation(self.world)
-        self.station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        self.world.run(0.5)
+        self.station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=0.5)
         self.world.plug()
         self.world.wait_ready(10)
         self.world.run(5)
@@ -172,13 +171,6 @@ def test_while_armed_the_missing_mission_is_reported_but_not_loaded() -> None:
     assert without_home(Download(bench.station).run()) == without_home(plan(5, 1))
 
 
-def pulled(bench: Bench) -> HeldMission | Refusal:
-    answers: list[HeldMission | Refusal] = []
-    bench.world.bridge.missions.pull(answers.append, bench.world.now)
-    bench.world.wait_until(lambda _: bool(answers), 30)
-    return answers[0]
-
-
 @pytest.mark.parametrize("command", [Msp.STATUS, Nav.GETINFO, Nav.LOAD])
 @pytest.mark.parametrize("lost", [3, 12])
 def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: int) -> None:
@@ -199,9 +191,8 @@ def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: 
     bench.board.power_on(bench.world.now)
     bench.world.wait_until(lambda world: world.is_found, 30)
     requests.clear()
-    held = pulled(bench)
-    while isinstance(held, Refusal):
-        held = pulled(bench)
+    while isinstance(held := bench.world.pull(), Refusal):
+        pass
     assert [record.pack() for record in held.records] == sets(4)[0]
     bench.world.run(2)
     assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.text()

@@ -106,8 +106,7 @@ def test_a_board_met_over_msp_keeps_the_family_regardless_of_the_ids() -> None:
 
 
 def test_a_harakiri_that_disarms_is_asked_for_msp_at_once() -> None:
-    world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), speeds=(115200,))
-    world.wait_ready()
+    world = ready_world(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.faults.armed = True
     world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.vehicle.armed is True, 8)
     world.run(3.3)

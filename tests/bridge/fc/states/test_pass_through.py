@@ -180,9 +180,8 @@ def test_an_addressed_frame_goes_only_to_the_target() -> None:
 
 
 def test_ground_stations_reach_each_other() -> None:
-    world, autopilot, (one, other) = passing()
-    one.send(mavlink.MAVLink_param_set_message(254, 190, b"STATION", 1, 9))
-    world.run(0.1)
+    _world, autopilot, (one, other) = passing()
+    one.send(mavlink.MAVLink_param_set_message(254, 190, b"STATION", 1, 9), wait_s=0.1)
     assert [message.get_type() for message in other.messages("PARAM_SET")] == ["PARAM_SET"]
     assert bytes(autopilot.received) == b""
 
@@ -205,8 +204,7 @@ def test_after_an_autopilot_is_unplugged_the_bridge_represents_its_own_vehicle()
     assert len(station.messages("HEARTBEAT")) >= 4
     station.take()
     station.send(mavlink.MAVLink_param_request_list_message(1, 1))
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3))
-    world.run(0.5)
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3), wait_s=0.5)
     assert station.messages("PARAM_VALUE")
     assert [ack.type for ack in station.messages("MISSION_ACK")] == [mavlink.MAV_MISSION_DENIED]
     world.plug()
@@ -242,8 +240,7 @@ def test_a_companion_with_the_autopilots_system_id_is_heard_but_echoes_are_not(s
     world, autopilot, (one, two) = passing(Autopilot(sysid))
     world.run(1)
     companion = GroundStation(world, "companion", sysid=sysid, compid=191)
-    companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
-    world.run(0.1)
+    companion.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3), wait_s=0.1)
     assert bytes(autopilot.received)
     assert one.messages("HEARTBEAT")[-1].get_srcComponent() == 191
     autopilot.received.clear()
@@ -277,8 +274,7 @@ def test_a_reused_address_does_not_get_frames_for_earlier_ids() -> None:
     world.bridge.gcs_gone(one.peer, world.now)
     successor = GroundStation(world, "gcs0", sysid=7)
     assert successor.peer == one.peer
-    successor.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    world.run(0.1)
+    successor.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=0.1)
     autopilot.send(mavlink.MAVLink_mission_ack_message(255, 190, 0, 0))
     autopilot.send(mavlink.MAVLink_mission_ack_message(7, 190, 0, 0))
     world.run(0.1)

@@ -13,11 +13,7 @@ from bridge.fc.states.base import Closed
 from bridge.fc.states.searching import SPEEDS, Searching
 from protocols.msp.frame import request
 from simulator.board.options import Faults, SimOptions, TelemetryProtocol
-from tests.support.fake_controllers import (
-    Loopback,
-    MavlinkOnly,
-    QuietLine,
-)
+from tests.support.fake_controllers import Loopback, MavlinkOnly, QuietLine
 from tests.support.seeds import seeds
 from tests.support.world import World
 
