@@ -7,10 +7,10 @@ from dataclasses import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.station import Datagrams, Peer
-from bridge.relay import Relays, SendToVehicle, WriteList, WriteResult
+from bridge.relay import Relays, SameSystem, SendToVehicle, WriteList, WriteResult
 from protocols.mavlink.codec import FrameWriter, decode
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.frame import MavlinkSplitter
+from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
 from reports.finding import Finding, News
 from tests.support.packing import pack
@@ -25,29 +25,42 @@ NONE = ListIdentity(0, 0)
 
 
 class Bench:
-    """The relay, a ground station right next to it, and a vehicle whose replies are made by the test."""
+    """Relays of vehicles with these system ids, and a ground station right next to them.
 
-    def __init__(self) -> None:
-        self.to_vehicle: list[bytes] = []
-        self.written: list[Sequence[MissionItem]] = []
+    `to_vehicle` has the message types that each vehicle was sent, `frames` what the station got.
+    """
+
+    def __init__(self, **systems: int) -> None:
+        self.to_vehicle: dict[str, list[str]] = {}
+        self.written: dict[str, Sequence[MissionItem]] = {}
+        self.clashes: list[tuple[str, str, int]] = []
+        self.frames: list[tuple[MavlinkFrame, Message]] = []
         self.relays = Relays()
-        self.relays.add("owl")
+        self.relays.add_default_peer(PEER)
         self.now = 100.0
-        self.frames: list[tuple[int, Message]] = []
-        self._writer, self._vehicle = FrameWriter(255, 190), FrameWriter(*VEHICLE)
+        self._writer = FrameWriter(255, 190)
+        for name, system in systems.items():
+            self.join(name, system)
+
+    def join(self, name: str, system: int, *, stores: bool = True) -> None:
+        self.to_vehicle[name] = []
+        self.relays.add(name)
+        self.heartbeat(name, system)
+        if stores:
+            self.relays.holds(name, (), NONE)
+
+    def heartbeat(self, name: str, system: int, *, armed: bool = False) -> None:
+        """Of a vehicle."""
+        message = m.MAVLink_heartbeat_message(2, 3, 81 | (128 * armed), 0, 3, 3)
+        self.relays.vehicle_received(name, FrameWriter(system, 1).frame(pack(message), 2), self.now)
+        self._take()
 
     def send(self, message: Message) -> list[Message]:
-        """Send a message of the ground station; the relay's answers."""
+        """Send a message of the ground station; the answers."""
         before = len(self.frames)
         self.relays.gcs_received(PEER, self._writer.frame(pack(message), 2), self.now, datagram=True)
         self.run(0.01)
         return [answer for _, answer in self.frames[before:]]
-
-    def heartbeat(self, *, armed: bool = False) -> None:
-        """Of the vehicle."""
-        message = m.MAVLink_heartbeat_message(2, 3, 81 | (128 * armed), 0, 3, 3)
-        self.relays.vehicle_received("owl", self._vehicle.frame(pack(message), 2), self.now)
-        self._take()
 
     def run(self, seconds: float) -> None:
         end = self.now + seconds
@@ -63,21 +76,25 @@ class Bench:
         while requests := [each.seq for each in wanted if each.get_type() == "MISSION_REQUEST"]:
             wanted = self.send(item_int(plan[requests[-1]]))
 
-    def last(self, kind: str) -> Message | None:
-        return next((each for _, each in reversed(self.frames) if each.get_type() == kind), None)
+    def acks(self) -> list[int]:
+        return [message.type for _, message in self.frames if message.get_type() == "MISSION_ACK"]
 
     def _take(self) -> None:
-        for _, effect in self.relays.take():
+        for name, effect in self.relays.take():
             match effect:
                 case SendToVehicle(sent):
-                    self.to_vehicle.append(sent)
+                    self.to_vehicle[name] += [message.get_type() for _, message in decoded(sent)]
                 case WriteList(items):
-                    self.written.append(items)
+                    self.written[name] = items
+                case SameSystem(other, system):
+                    self.clashes.append((name, other, system))
                 case Datagrams():
-                    for frame in MavlinkSplitter().feed(b"".join(data for _, data in effect)):
-                        message = decode(frame)
-                        assert message is not None
-                        self.frames.append((frame.raw[4], message))
+                    self.frames += decoded(b"".join(data for _, data in effect))
+
+
+def decoded(data: bytes) -> list[tuple[MavlinkFrame, Message]]:
+    found = ((frame, decode(frame)) for frame in MavlinkSplitter().feed(data))
+    return [(frame, message) for frame, message in found if message is not None]
 
 
 def item_int(item: MissionItem) -> Message:
@@ -88,36 +105,31 @@ def item_int(item: MissionItem) -> Message:
 
 def connected(*, stores: bool = True) -> Bench:
     bench = Bench()
-    bench.heartbeat()
-    if stores:
-        bench.relays.holds("owl", (), NONE)
+    bench.join("owl", VEHICLE[0], stores=stores)
     bench.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    bench.to_vehicle.clear()
+    bench.to_vehicle["owl"].clear()
     return bench
 
 
 def test_a_list_crosses_the_link_as_a_whole_and_is_acknowledged_when_the_vehicle_has_verified_it() -> None:
     bench = connected()
     bench.upload(PLAN)
-    (written,) = bench.written
-    assert tuple(written) == PLAN
-    assert bench.to_vehicle == []
+    assert tuple(bench.written["owl"]) == PLAN
+    assert bench.to_vehicle == {"owl": []}
     bench.run(2.0)
-    assert bench.last("MISSION_ACK") is None
+    assert bench.acks() == []
     stored = (PLAN[0], *(replace(item, p1=1.0) for item in PLAN[1:]))
     finding = Finding(1, "p1", 0.0, 1, "0 not allowed", 16, News.NOTICE)
     bench.relays.wrote("owl", WriteResult(MissionResult.ACCEPTED, "Mission verified: 146 records", [finding], stored))
     bench.run(0.5)
-    ack = bench.last("MISSION_ACK")
-    assert ack is not None
-    assert ack.type == MissionResult.ACCEPTED
+    assert bench.acks()[-1] == MissionResult.ACCEPTED
     texts = [message.text for _, message in bench.frames if message.get_type() == "STATUSTEXT"]
     assert any("0 not allowed" in text for text in texts)
     (count,) = bench.send(m.MAVLink_mission_request_list_message(*VEHICLE))
     assert count.count == 146
     (item,) = bench.send(m.MAVLink_mission_request_int_message(*VEHICLE, 145))
     assert (item.seq, item.param1, item.x) == (145, 1.0, PLAN[145].lat_e7)
-    assert bench.to_vehicle == []
+    assert bench.to_vehicle == {"owl": []}
 
 
 def test_the_vehicles_refusal_is_the_final_ack() -> None:
@@ -125,34 +137,30 @@ def test_the_vehicles_refusal_is_the_final_ack() -> None:
     bench.upload(PLAN[:5])
     bench.relays.wrote("owl", WriteResult(MissionResult.DENIED, "Rejected, WP 3: too far"))
     bench.run(0.5)
-    ack = bench.last("MISSION_ACK")
-    assert ack is not None
-    assert ack.type == MissionResult.DENIED
+    assert bench.acks()[-1] == MissionResult.DENIED
     assert any(each.text.startswith("Rejected, WP 3") for _, each in bench.frames if each.get_type() == "STATUSTEXT")
 
 
 def test_does_not_send_to_an_armed_vehicle() -> None:
     bench = connected()
-    bench.heartbeat(armed=True)
+    bench.heartbeat("owl", VEHICLE[0], armed=True)
     bench.upload(PLAN[:5])
-    assert bench.written == []
-    ack = bench.last("MISSION_ACK")
-    assert ack is not None
-    assert ack.type == MissionResult.DENIED
+    assert bench.written == {}
+    assert bench.acks()[-1] == MissionResult.DENIED
 
 
 def test_an_empty_list_clears_the_vehicles() -> None:
     bench = connected()
     bench.send(m.MAVLink_mission_clear_all_message(*VEHICLE))
     bench.run(0.1)
-    assert bench.written == [()]
+    assert bench.written == {"owl": ()}
 
 
 def test_a_vehicle_that_does_not_store_missions_gets_every_frame_itself() -> None:
     bench = connected(stores=False)
     assert bench.send(m.MAVLink_mission_count_message(*VEHICLE, 5)) == []
     assert bench.send(m.MAVLink_param_request_list_message(*VEHICLE)) == []
-    assert len(bench.to_vehicle) == 2
+    assert bench.to_vehicle == {"owl": ["MISSION_COUNT", "PARAM_REQUEST_LIST"]}
 
 
 def test_all_other_frames_and_those_of_other_targets_are_passed_on() -> None:
@@ -162,15 +170,15 @@ def test_all_other_frames_and_those_of_other_targets_are_passed_on() -> None:
         m.MAVLink_mission_count_message(9, 1, 5),
         m.MAVLink_mission_count_message(*VEHICLE, 5, m.MAV_MISSION_TYPE_FENCE),
     ):
-        bench.to_vehicle.clear()
+        bench.to_vehicle["owl"].clear()
         assert bench.send(message) == []
-        assert len(bench.to_vehicle) == 1
+        assert bench.to_vehicle == {"owl": [message.get_type()]}
 
 
 def test_the_sequence_numbers_are_gapless() -> None:
     bench = connected()
     for _ in range(3):
-        bench.heartbeat()
+        bench.heartbeat("owl", VEHICLE[0])
         bench.send(m.MAVLink_mission_request_list_message(*VEHICLE))
-    numbers = [number for number, _ in bench.frames]
+    numbers = [frame.raw[4] for frame, _ in bench.frames]
     assert numbers == [*range(numbers[0], numbers[0] + len(numbers))]

@@ -189,21 +189,25 @@ def test_another_clients_change_prevents_the_save() -> None:
     assert "p_roll has another value" in result.text
 
 
+def planned(world: World) -> object:
+    """A plan from memory."""
+    found: list[object] = []
+    world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
+    (plan,) = found
+    return plan
+
+
 def test_the_plan_from_memory_does_not_ask_the_board() -> None:
     world, client = ready(BOARDS[NAZE])
     client.wait_read()
-    found: list[object] = []
     before = len(world.written)
-    world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
-    assert len(found) == 1
+    assert isinstance(planned(world), RestorePlan)
     assert len(world.written) == before
 
 
 def test_a_plan_needs_a_board() -> None:
     world = World(powered=False)
-    found: list[object] = []
-    world.bridge.settings.plan({"p_roll": 44.0}, "", lambda plan, _at: found.append(plan), world.now, is_checked=False)
-    assert isinstance(found[0], SettingRefusal)
+    assert isinstance(planned(world), SettingRefusal)
     assert isinstance(restored(world, {"p_roll": 44.0}), SettingRefusal)
 
 
@@ -245,9 +249,18 @@ def test_a_setting_that_cannot_be_written_is_left_out_with_the_reason(name: str,
     assert found.left_out == (LeftOut(name, value, TABLE.settings[name].value, why),)
 
 
-def test_the_texts_of_a_dump_are_numbers_and_choices() -> None:
-    found = plan({"p_roll": "40", "cf": "0.100", "mode": "115200"})
-    assert found.changes == (PlannedChange("p_roll", 35, 40.0), PlannedChange("mode", 0, 1))
+@pytest.mark.parametrize(
+    ("wanted", "changes"),
+    [
+        # The texts of a dump.
+        ({"p_roll": "40", "cf": "0.100"}, [PlannedChange("p_roll", 35, 40.0)]),
+        ({"mode": "115200"}, [PlannedChange("mode", 0, 1)]),
+        ({"esc_moff": 999.0}, [PlannedChange("esc_moff", 1000, 999.0)]),
+        ({"name": 5.0}, [PlannedChange("name", "kite", "5")]),
+    ],
+)
+def test_values_are_written_as_the_settings_kind(wanted: dict[str, Value], changes: list[PlannedChange]) -> None:
+    assert [*plan(wanted).changes] == changes
 
 
 def test_the_pids_of_a_betaflight_dump() -> None:
@@ -256,18 +269,11 @@ def test_the_pids_of_a_betaflight_dump() -> None:
     assert by_setting(given, known) == {"ROLL_P": "44", "MIN_THROTTLE": "1070", "d_roll": "20", "x": "1"}
 
 
-def test_a_setting_that_can_only_be_lowered_is_lowered() -> None:
-    assert plan({"esc_moff": 999.0}).changes == (PlannedChange("esc_moff", 1000, 999.0),)
-
-
-def test_a_text_that_looks_like_a_number_is_restored_as_a_text() -> None:
-    assert plan({"name": 5.0}).changes == (PlannedChange("name", "kite", "5"),)
-
-
-def test_settings_of_another_firmware_are_refused() -> None:
+def test_settings_of_another_firmware_or_of_no_setting_are_refused() -> None:
     refusal = plan_restore({"p_roll": 40.0}, "INAV 8.0.1", TABLE, BOARD)
     assert isinstance(refusal, SettingRefusal)
     assert refusal.text == "These settings are from INAV 8.0.1, but the board has Harakiri 2.1.1"
+    assert isinstance(plan_restore({"WPNAV_SPEED": 5.0}, "", TABLE, BOARD), SettingRefusal)
 
 
 def test_settings_of_another_version_carry_a_notice() -> None:
@@ -275,10 +281,6 @@ def test_settings_of_another_version_carry_a_notice() -> None:
     assert found.changes
     assert "Harakiri 2.0.0" in found.notice
     assert plan({"p_roll": 40.0}, "").notice == ""
-
-
-def test_a_file_without_any_setting_of_the_board_is_refused() -> None:
-    assert isinstance(plan_restore({"WPNAV_SPEED": 5.0}, "", TABLE, BOARD), SettingRefusal)
 
 
 @given(st.dictionaries(st.sampled_from([*NAMES, "other"]), VALUES, min_size=1))

@@ -16,7 +16,7 @@ from simulator.commands.fc_kinds import make_board
 from simulator.naze.setting_table import SETTINGS
 from tests.bridge.vehicle.test_commands import answers, m
 from tests.support.screens import Screens
-from tests.support.settings_client import SettingsClient
+from tests.support.settings_client import SettingsClient, restart
 from tests.support.world import GroundStation, World, ready_world
 
 #: The bridge's own parameters for a patched Harakiri; for other boards one less.
@@ -149,9 +149,7 @@ def test_the_radius_of_the_plan_screen_is_a_setting_of_a_harakiri() -> None:
     assert station.texts() == []
     assert SettingsClient(world).value("gps_wp_radius") == 350
     station.send(command_of_storage(1), wait_s=2)
-    world.power_off()
-    world.power_on()
-    world.run(world.naze.options.boot_ms / 1000 + 5)
+    restart(world)
     assert radius_now(world, station) == 350.0
 
 
@@ -289,10 +287,9 @@ def test_a_refused_value_is_answered_with_the_reason_and_the_value_in_force(
 ) -> None:
     world, station = settled_world()
     received = reply_to(world, station, name, value)
-    kinds = [each.get_type() for each in received if each.get_type() != "STATUSTEXT"]
-    assert kinds == ["PARAM_ERROR", "PARAM_VALUE"]
-    assert [each.error for each in received if each.get_type() == "PARAM_ERROR"] == [error]
-    assert received[-1].param_value == kept
+    refused, in_force = (each for each in received if each.get_type() != "STATUSTEXT")
+    assert (refused.get_type(), refused.error) == ("PARAM_ERROR", error)
+    assert (in_force.get_type(), in_force.param_value) == ("PARAM_VALUE", kept)
     assert sentence in " ".join(station.texts())
 
 
@@ -331,9 +328,7 @@ def test_preflight_storage_saves_once_and_only_what_was_changed() -> None:
     assert station.texts().count("Settings saved") == 1
     written = world.naze.flash_operations
     assert written > operations
-    world.power_off()
-    world.power_on()
-    world.run(world.naze.options.boot_ms / 1000 + 5)
+    restart(world)
     assert SettingsClient(world).value("p_roll") == 44
 
 
@@ -376,21 +371,13 @@ def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> N
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
 
 
-def test_a_list_requested_before_the_settings_are_read_waits_for_them() -> None:
+def test_what_is_requested_before_the_settings_are_read_waits_for_them() -> None:
     world = World(speeds=(115200,))
     world.wait_until(lambda world: world.is_found, 20)
-    station = GroundStation(world)
-    received = parameter_list(world, station)
-    assert {each.param_count for each in received} == {ALL}
-
-
-def test_a_setting_requested_before_the_settings_are_read_is_answered_then() -> None:
-    world = World(speeds=(115200,))
-    world.wait_until(lambda world: world.is_found, 20)
-    station = GroundStation(world)
-    station.send(m.MAVLink_param_request_read_message(1, 1, b"P_ROLL", -1))
-    world.wait_until(lambda _: bool(station.messages("PARAM_VALUE")), 10)
-    assert station.messages("PARAM_VALUE")[0].param_id == "P_ROLL"
+    station, other = GroundStation(world), GroundStation(world, "other", sysid=254)
+    other.send(m.MAVLink_param_request_read_message(1, 1, b"P_ROLL", -1))
+    assert {each.param_count for each in parameter_list(world, station)} == {ALL}
+    assert other.messages("PARAM_VALUE")[0].param_id == "P_ROLL"
 
 
 def test_a_station_with_a_shorter_list_gets_the_whole_list_later() -> None:
@@ -427,45 +414,25 @@ def test_a_station_that_leaves_takes_the_list_along() -> None:
     assert not [each for each in parameters._dialogues if each.peer == station.peer]
 
 
-def _begin_upload(world: World, station: GroundStation) -> None:
-    station.send(m.MAVLink_mission_count_message(1, 1, 20), wait_s=0.1)
-
-
-def _arm(world: World, _station: GroundStation) -> None:
-    world.faults.armed = True
-    world.run(2)
-
-
-def _lose(world: World, _station: GroundStation) -> None:
-    world.power_off()
-    world.run(6)
-
-
-def _hang(world: World, _station: GroundStation) -> None:
-    world.faults.hang = True
-
-
-def _nothing(_world: World, _station: GroundStation) -> None:
-    """The value or the name is the reason."""
-
-
-#: The preparation, the name (empty: a setting of the board), the value (0: a valid one), and MAV_PARAM_ERROR.
+#: The name (empty: a setting of the board), the value (0: a valid one), and MAV_PARAM_ERROR.
 _REFUSALS = {
-    "too high": (_nothing, b"", 1e9, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
-    "not a number": (_nothing, b"", math.nan, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
-    "the bridge's own": (_nothing, b"RC3_MIN", 7.0, m.MAV_PARAM_ERROR_READ_ONLY),
-    "unknown": (_nothing, b"NO_SUCH_NAME", 7.0, m.MAV_PARAM_ERROR_DOES_NOT_EXIST),
-    "armed": (_arm, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
-    "lost": (_lose, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
-    "without an answer": (_hang, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
-    "during an upload": (_begin_upload, b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "too high": (b"", 1e9, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+    "not a number": (b"", math.nan, m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+    "the bridge's own": (b"RC3_MIN", 7.0, m.MAV_PARAM_ERROR_READ_ONLY),
+    "unknown": (b"NO_SUCH_NAME", 7.0, m.MAV_PARAM_ERROR_DOES_NOT_EXIST),
+    "armed": (b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "lost": (b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "without an answer": (b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
+    "during an upload": (b"", 0.0, m.MAV_PARAM_ERROR_PERMISSION_DENIED),
 }
 
 
 @pytest.mark.parametrize(
     ("kind", "reason"),
-    [*(("harakiri", reason) for reason in _REFUSALS)]
-    + [(kind, reason) for kind in ("inav", "multiwii") for reason in ("too high", "armed", "without an answer")],
+    [
+        *(("harakiri", reason) for reason in _REFUSALS),
+        *((kind, reason) for kind in ("inav", "multiwii") for reason in ("too high", "armed", "without an answer")),
+    ],
 )
 def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str) -> None:
     """QGroundControl repeats it without, and MAVSDK waits."""
@@ -479,8 +446,18 @@ def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str)
     setting = next(
         each for each in table if each.name.upper() in names and each.kind is ValueKind.INTEGER and not each.fixed
     )
-    prepare, name, value, error = _REFUSALS[reason]
-    prepare(world, station)
+    name, value, error = _REFUSALS[reason]
+    match reason:
+        case "armed":
+            world.faults.armed = True
+            world.run(2)
+        case "lost":
+            world.power_off()
+            world.run(6)
+        case "without an answer":
+            world.faults.hang = True
+        case "during an upload":
+            station.send(m.MAVLink_mission_count_message(1, 1, 20), wait_s=0.1)
     other = setting.minimum + (setting.value == setting.minimum)
     received = reply_to(world, station, name or setting.name.upper().encode(), value or other, 8)
     assert [each.error for each in received if each.get_type() == "PARAM_ERROR"] == [error]
