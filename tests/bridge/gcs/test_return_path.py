@@ -13,16 +13,15 @@ from bridge.controllers import other
 from bridge.gcs.rights import LinkAccess
 from bridge.gcs.station import Peer
 from protocols.mavlink.dialect import Message
-from protocols.mavlink.signing import Signing, Timestamps, key_from_passphrase, ticks
+from protocols.mavlink.signing import ticks
 from protocols.mission_item import MissionResult
 from tests.bridge.fc.states.test_pass_through import Autopilot
+from tests.bridge.vehicle.test_incoming import KEY, NOON, signing
 from tests.support.conversations import Upload, count_message, records_of, waypoints
 from tests.support.world import GroundStation, World, ready_world
 
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 STREAMS = m.MAVLink_request_data_stream_message(1, 1, 0, 50, 1)
-KEY = key_from_passphrase("a passphrase")
-NOON = 1_795_262_400.0
 FAR, NEAR = ("198.51.100.7", 14550), ("192.168.4.7", 14550)
 
 
@@ -58,7 +57,7 @@ def is_served(station: GroundStation) -> bool:
 def test_one_forged_datagram_causes_at_most_three_times_the_size(
     address: tuple[str, int], version: int, *, has_key: bool
 ) -> None:
-    world = world_with({"udp": LinkAccess(Signing(KEY, Timestamps(lambda: NOON)))} if has_key else None)
+    world = world_with({"udp": LinkAccess(signing())} if has_key else None)
     victim = GroundStation(world, address, version=version)
     datagram = victim.pack(HELLO) + victim.pack(STREAMS)
     world.receive_from(victim, datagram)
@@ -125,7 +124,7 @@ def test_an_answer_that_only_the_address_can_know_is_a_proof(kind: str) -> None:
 
 
 def test_a_signature_is_a_proof() -> None:
-    world = world_with({"udp": LinkAccess(Signing(KEY, Timestamps(lambda: NOON)))})
+    world = world_with({"udp": LinkAccess(signing())})
     station = GroundStation(world, FAR)
     station.sign(KEY, ticks(NOON))
     station.send(HELLO, wait_s=0.1)

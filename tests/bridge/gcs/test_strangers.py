@@ -12,18 +12,15 @@ import pytest
 from pymavlink.dialects.v20 import all as every_message
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from bridge.controllers import other
 from bridge.gcs.rights import LinkAccess, Standing
 from bridge.gcs.station import Peer
 from protocols.mavlink.codec import FrameWriter, Packed
 from protocols.mavlink.dialect import MESSAGE_FORMATS, Message
 from protocols.mavlink.frame import MavlinkSplitter
-from protocols.mavlink.signing import Check, Signing, Timestamps, key_from_passphrase, ticks
-from tests.bridge.fc.states.test_pass_through import Autopilot
+from protocols.mavlink.signing import Check, ticks
+from tests.bridge.vehicle.test_incoming import KEY, NOON, passing, signing
 from tests.support.world import GroundStation, World
 
-KEY = key_from_passphrase("a passphrase")
-NOON = 1_795_262_400.0
 HELLO = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 #: A vehicle that is connected like a ground station.
 SECOND_VEHICLE = 42
@@ -47,25 +44,12 @@ MOVES = {
 }  # fmt: skip
 
 
-def signing() -> Signing:
-    return Signing(KEY, Timestamps(lambda: NOON))
-
-
 def on_link(station: GroundStation, link: str) -> GroundStation:
     world = station.world
     del world.stations[station.peer]
     station.peer = Peer(link, station.peer.key)
     world.stations[station.peer] = station
     return station
-
-
-def passing(links: dict[str, LinkAccess], sysid: int = 1, *, everything: bool = False) -> tuple[World, Autopilot]:
-    autopilot = Autopilot(sysid)
-    world = World(peer=autopilot, links=links, passes_everything=everything)
-    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
-    world.run(1.5)
-    autopilot.received.clear()
-    return world, autopilot
 
 
 def decoded(data: bytes) -> list[Message]:

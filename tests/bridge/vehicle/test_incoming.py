@@ -93,9 +93,9 @@ def signing_station(world: World, name: str = "gcs", *, at: int = ticks(NOON), s
     return station
 
 
-def passing(links: dict[str, LinkAccess], sysid: int = 1) -> tuple[World, Autopilot]:
+def passing(links: dict[str, LinkAccess], sysid: int = 1, *, everything: bool = False) -> tuple[World, Autopilot]:
     autopilot = Autopilot(sysid=sysid)
-    world = World(peer=autopilot, links=links)
+    world = World(peer=autopilot, links=links, passes_everything=everything)
     world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
     world.run(1.5)
     autopilot.received.clear()
@@ -120,18 +120,19 @@ def test_messages_that_change_something_must_be_signed(message: Message, answer:
     station = GroundStation(world, version=version)
     station.send(message, wait_s=0.01)
     assert refusals(world) == {"not signed": 1}
-    types = [message.get_type() for message in station.messages() if message.get_type() in ANSWERS]
-    assert types == ([] if answer is None else [answer])
-    if answer == "MISSION_ACK":
-        (ack,) = station.messages("MISSION_ACK")
-        assert (ack.type, ack.mission_type) == (MissionResult.DENIED, getattr(message, "mission_type", 0))
-        assert station.is_target_of(ack)
-    if answer == "COMMAND_ACK":
-        (ack,) = station.messages("COMMAND_ACK")
-        assert (ack.result, ack.command) == (mavlink.MAV_RESULT_DENIED, message.command)
-    if answer == "PARAM_VALUE":
-        (value,) = station.messages("PARAM_VALUE")
-        assert (value.param_id, value.param_value) == ("SYSID_THISMAV", 1.0)
+    received = station.messages(*ANSWERS)
+    assert [each.get_type() for each in received] == ([] if answer is None else [answer])
+    match answer:
+        case "MISSION_ACK":
+            (ack,) = received
+            assert (ack.type, ack.mission_type) == (MissionResult.DENIED, getattr(message, "mission_type", 0))
+            assert station.is_target_of(ack)
+        case "COMMAND_ACK":
+            (ack,) = received
+            assert (ack.result, ack.command) == (mavlink.MAV_RESULT_DENIED, message.command)
+        case "PARAM_VALUE":
+            (value,) = received
+            assert (value.param_id, value.param_value) == ("SYSID_THISMAV", 1.0)
     assert station.texts() == ["Refused: not signed"]
 
 
@@ -364,8 +365,7 @@ def test_an_unlisted_address_may_only_read() -> None:
 
 
 def test_with_a_key_and_a_list_both_are_required() -> None:
-    access = LinkAccess(signing(), LINK_ID, lambda peer: peer.key == "pilot")
-    world = ready_world(links={"udp": access})
+    world = ready_world(links={"udp": LinkAccess(signing(), LINK_ID, lambda peer: peer.key == "pilot")})
     assert Upload(signing_station(world, "guest", sysid=250), waypoints(3)).run() is MissionResult.DENIED
     assert Upload(GroundStation(world, "pilot"), waypoints(3)).run() is MissionResult.DENIED
     assert Upload(signing_station(world, "pilot"), waypoints(3)).run() is MissionResult.ACCEPTED

@@ -8,7 +8,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.rights import LinkAccess
-from bridge.gcs.station import Peer
 from bridge.model.vehicle import MissionLeg
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import Command, MissionItem, MissionResult
@@ -261,29 +260,20 @@ def test_the_item_has_the_number_of_the_list_that_the_station_sent() -> None:
     assert "Set WP: item 4 (DO_JUMP) is not flown to" in reader.texts()
 
 
-def test_a_station_on_an_open_link_may_write_but_does_not_set_a_waypoint() -> None:
-    flight = Flight(links={})
-    assert Upload(flight.station, MISSION).run() is MissionResult.ACCEPTED
-    flight.begin()
-    flight.ask(set_current(3))
-    flight.ask(long(3))
-    assert (results(flight.station), flight.sent(), flight.number) == ([DENIED], [], 1)
-    assert "Set WP: needs a key, or pass_through = everything" in flight.station.texts()
-
-
-def test_a_station_that_may_only_read_does_not_set_a_waypoint() -> None:
-    def may_write(peer: Peer) -> bool:
-        return peer.key == "pilot"
-
-    flight = Flight(links={"udp": LinkAccess(may_write=may_write)})
+@pytest.mark.parametrize("links", [{}, {"udp": LinkAccess(may_write=lambda peer: peer.key == "pilot")}])
+def test_a_station_on_an_open_link_or_without_rights_does_not_set_a_waypoint(links: dict[str, LinkAccess]) -> None:
+    """On an open link it may write a mission."""
+    flight = Flight(links=links)
     pilot = GroundStation(flight.world, "pilot")
     assert Upload(pilot, MISSION).run() is MissionResult.ACCEPTED
     flight.begin()
     flight.ask(set_current(3))
     flight.ask(long(3))
     assert (results(flight.station), flight.sent(), flight.number) == ([DENIED], [], 1)
+    needs_key = "Set WP: needs a key, or pass_through = everything"
+    assert (needs_key in flight.station.texts()) is not bool(links)
     flight.ask(set_current(3), pilot)
-    assert flight.number == 3
+    assert flight.number == (3 if links else 1)
 
 
 def test_an_unknown_mission_is_not_sent() -> None:
@@ -299,8 +289,7 @@ def test_an_unknown_mission_is_not_sent() -> None:
 
 
 def test_other_boards_refuse_it_as_before() -> None:
-    board = make_board("multiwii", MspOptions(), Faults(boxes=0))
-    world = ready_world(peer=board, within_s=10)
+    world = ready_world(peer=make_board("multiwii", MspOptions(), Faults(boxes=0)), within_s=10)
     world.run(2)
     station = GroundStation(world)
     station.send(long(1), wait_s=0.5)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Set waypoint against an INAV that answers wrongly, late or not at all."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from struct import pack
 
@@ -49,12 +48,18 @@ class Inav:
         return None if command in self.lost else MspFrame(direction, command, reply)
 
 
-def run(inav: Inav, number: int = 3, held: NavRecord | None = RECORD) -> Refusal | None:
+def refusal(inav: Inav, held: NavRecord | None = RECORD) -> Refusal:
+    found = run(inav, held)
+    assert found is not None
+    return found
+
+
+def run(inav: Inav, held: NavRecord | None = RECORD) -> Refusal | None:
     def read() -> Conversation[NavRecord | None]:
         yield from ()
         return held
 
-    conversation = fly_to(number, RECORD, read(), BOARD)
+    conversation = fly_to(3, RECORD, read(), BOARD)
     answer: MspFrame | None = None
     try:
         while True:
@@ -87,53 +92,37 @@ def test_a_lost_reply_is_not_a_failure_if_the_craft_flies_there() -> None:
     ],
 )
 def test_a_craft_that_does_not_fly_there_is_a_failure(inav: Inav, ack: MissionResult, text: str) -> None:
-    refusal = run(inav)
-    assert refusal is not None
-    assert refusal.ack is ack
-    assert text in refusal.text
+    refused = refusal(inav)
+    assert refused.ack is ack
+    assert text in refused.text
     assert len(inav.set_to) == (inav.lost <= {0x2221})
 
 
-def changed(**values: int) -> Callable[[], Inav]:
-    def make() -> Inav:
-        inav = Inav()
-        for name, value in values.items():
-            setattr(inav, name, value)
-        return inav
-
-    return make
-
-
 @pytest.mark.parametrize(
-    ("make", "text"),
+    ("changed", "text"),
     [
-        (changed(boxes=0b01), "only in flight"),
-        (changed(boxes=0b10), "only in flight"),
-        (changed(mode=2), "only in flight"),
-        *((changed(state=state), "landing") for state in (8, 9, 10, 11, 12, 14)),
-        (changed(error=FINISHED, action=NavAction.LAND), "landing"),
+        ({"boxes": 0b01}, "only in flight"),
+        ({"boxes": 0b10}, "only in flight"),
+        ({"mode": 2}, "only in flight"),
+        *(({"state": state}, "landing") for state in (8, 9, 10, 11, 12, 14)),
+        ({"error": FINISHED, "action": NavAction.LAND}, "landing"),
     ],
 )
-def test_refuses_unless_the_mission_is_in_flight(make: Callable[[], Inav], text: str) -> None:
-    inav = make()
-    refusal = run(inav)
-    assert refusal is not None
-    assert text in refusal.text
+def test_refuses_unless_the_mission_is_in_flight(changed: dict[str, int], text: str) -> None:
+    inav = Inav()
+    vars(inav).update(changed)
+    assert text in refusal(inav).text
     assert inav.set_to == []
 
 
 @pytest.mark.parametrize("held", [None, replace(RECORD, alt_cm=2001)])
 def test_refuses_if_the_board_holds_another_record(held: NavRecord | None) -> None:
     inav = Inav()
-    refusal = run(inav, held=held)
-    assert refusal is not None
-    assert refusal.text == "Set WP: read the mission from the board first"
+    assert refusal(inav, held).text == "Set WP: read the mission from the board first"
     assert inav.set_to == []
 
 
 def test_a_new_version_may_refuse_for_other_reasons() -> None:
     inav = Inav()
     inav.direction = Direction.ERROR
-    refusal = run(inav)
-    assert refusal is not None
-    assert refusal.text == "Set WP: INAV refused it"
+    assert refusal(inav).text == "Set WP: INAV refused it"
