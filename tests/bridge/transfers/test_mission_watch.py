@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lists that change on the board without the bridge are noticed, read and reported."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -17,7 +18,7 @@ from simulator.inav.mission import CAPACITY
 from simulator.multiwii.mission import MultiWiiMission
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
 from tests.bridge.controllers.nav.test_mission_store import packed, plan
-from tests.bridge.controllers.nav.test_stored_missions import Bench, sets
+from tests.bridge.controllers.nav.test_stored_missions import Bench, records, sets
 from tests.support.conversations import Upload
 from tests.support.msp_bench import waypoint
 from tests.support.world import GroundStation, World, ready_world
@@ -32,9 +33,7 @@ def test_a_mission_selected_by_sticks_is_noticed_within_two_seconds(armed: bool)
     bench.world.run(3)
     bench.faults.selected_mission = 2
     bench.world.run(2.0)
-    held = bench.world.bridge.missions.held
-    assert held is not None
-    assert [record.pack() for record in held.records] == sets(4, 6)[1]
+    assert records(bench.world.bridge.missions.held) == sets(4, 6)[1]
     assert "changed: 6 records" in bench.text()
 
 
@@ -47,9 +46,7 @@ def test_another_clients_list_is_noticed_and_the_progress_is_correct() -> None:
     bench.faults.stick_loads += 1
     bench.world.run(2.0)
     assert "changed: 4 records" in bench.text()
-    held = bench.world.bridge.missions.held
-    assert held is not None
-    assert [record.pack() for record in held.records] == sets(4)[0]
+    assert records(bench.world.bridge.missions.held) == sets(4)[0]
     bench.faults.armed, bench.faults.boxes = True, NAV_WP
     bench.world.run(5)
     assert {message.total for message in bench.station.messages("MISSION_CURRENT")[-3:]} == {4}
@@ -77,7 +74,7 @@ def test_a_list_of_the_same_size_is_noticed_within_two_seconds(kind: str, size: 
         MultiWiiMission(memoryview(eeprom), options.capacity).store(size // 2, unpack_waypoint(b"\0" + changed)[1])
     world.run(2.0)
     assert f"Mission on board changed: {size} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.missions.held.records] == packed(moved)  # type: ignore[union-attr]
+    assert records(world.bridge.missions.held) == packed(moved)
 
 
 def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundStation]:
@@ -89,27 +86,28 @@ def with_the_longest_list(streams_hz: int = 0) -> tuple[MspBoard, World, GroundS
     return board, world, station
 
 
+def write(board: MspBoard, mission: list[bytes], then: Callable[[], None] = lambda: None) -> None:
+    """Another client writes these records, and does something after each."""
+    for number, record in enumerate(mission, 1):
+        board._firmware._mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])  # type: ignore[union-attr]
+        then()
+
+
 def test_another_list_of_the_longest_size_is_noticed_within_two_seconds() -> None:
     board, world, station = with_the_longest_list(50)
     world.run(3)
     other = packed(plan(CAPACITY + 1, 3))
-    mission = board._firmware._mission  # type: ignore[union-attr]
-    for number, record in enumerate(other, 1):
-        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    write(board, other)
     world.run(2.0)
     assert f"Mission on board changed: {CAPACITY} records" in " ".join(station.texts())
-    assert [record.pack() for record in world.bridge.missions.held.records] == other  # type: ignore[union-attr]
+    assert records(world.bridge.missions.held) == other
 
 
 def test_one_changed_record_in_the_longest_list_is_noticed_from_the_upload() -> None:
     board, world, station = with_the_longest_list()
     world.run(3)
-    records = packed(plan(CAPACITY + 1))
-    records[0] = packed(plan(CAPACITY + 1, 3))[0]
-    mission = board._firmware._mission  # type: ignore[union-attr]
-    for number, record in enumerate(records, 1):
-        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
-        world.run(0.01)
+    _, *others = packed(plan(CAPACITY + 1))
+    write(board, [packed(plan(CAPACITY + 1, 3))[0], *others], lambda: world.run(0.01))
     world.run(2.0)
     assert f"Mission on board changed: {CAPACITY} records" in " ".join(station.texts())
 
@@ -118,15 +116,13 @@ def test_a_reloaded_earlier_list_is_noticed_within_six_seconds() -> None:
     """Another client has changed one of many records without saving, and loads the saved list."""
     board, world, _ = with_the_longest_list(50)
     ours = packed(plan(CAPACITY + 1))
-    records = [*ours[:76], packed(plan(CAPACITY + 1, 3))[76], *ours[77:]]
-    mission = board._firmware._mission  # type: ignore[union-attr]
-    for number, record in enumerate(records, 1):
-        mission.write(number, unpack_waypoint(bytes((number,)) + record)[1])
+    changed = [*ours[:76], packed(plan(CAPACITY + 1, 3))[76], *ours[77:]]
+    write(board, changed)
     world.run(10)
-    assert [record.pack() for record in world.bridge.missions.held.records] == records  # type: ignore[union-attr]
-    mission.load()
+    assert records(world.bridge.missions.held) == changed
+    board._firmware._mission.load()  # type: ignore[union-attr]
     world.run(6.5)
-    assert [record.pack() for record in world.bridge.missions.held.records] == ours  # type: ignore[union-attr]
+    assert records(world.bridge.missions.held) == ours
 
 
 def test_a_list_that_the_sticks_load_is_noticed_within_six_seconds() -> None:
@@ -138,7 +134,7 @@ def test_a_list_that_the_sticks_load_is_noticed_within_six_seconds() -> None:
         board._eeprom[(number - 1) * WAYPOINT_SIZE + 1 : number * WAYPOINT_SIZE] = changed
         board.faults.stick_loads += 1
         world.run(6.5)
-        assert world.bridge.missions.held.records[number - 1].pack() == changed  # type: ignore[union-attr]
+        assert records(world.bridge.missions.held)[number - 1] == changed
 
 
 def test_a_list_that_another_client_is_writing_is_reported_once_it_is_complete() -> None:

@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An INAV's landing approaches: SET_WP and SET_SAFEHOME erase them, and the bridge writes them again."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from protocols.mission_item import Command, MissionResult
-from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.inav_places import FW_APPROACH, SET_FW_APPROACH, SET_SAFEHOME, FwApproach, decode_approach
 from simulator.board.msp_board import MspBoard
 from simulator.inav.firmware import InavFirmware
 from simulator.inav.places import InavPlaces
 from tests.bridge.controllers.inav.test_mission_store import ACCEPTED, board_with
-from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS, place, read
+from tests.bridge.controllers.inav.test_place_store import RALLY, RALLY_ITEMS, place, read, refuse
 from tests.bridge.controllers.nav.test_mission_store import plan
 from tests.support.conversations import Upload
 from tests.support.nav_lists import HOME, LAT, LON, RTL_LANDS, WP
@@ -62,23 +60,13 @@ def test_an_approach_that_another_client_has_set_since_is_kept() -> None:
     assert approaches_of(board)[8] == approach(8)
 
 
-def refusing(answer: Callable[[int, bytes, float], bytes | None], refused: int) -> Callable[..., bytes | None]:
-    def answer_or_refuse(command: int, payload: bytes, now: float) -> bytes | None:
-        if command == refused:
-            return MspFrame(Direction.ERROR, command, b"", is_v2=True).encode()
-        return answer(command, payload, now)
-
-    return answer_or_refuse
-
-
 def test_a_mission_is_not_saved_without_the_approach(monkeypatch: pytest.MonkeyPatch) -> None:
     board, _, station = board_with(version="9.1.0", platform=_PLANE)
     set_approaches(board, 8)
     places_of(board).save()
-    firmware = board._firmware
-    monkeypatch.setattr(firmware, "answer", refusing(firmware.answer, SET_FW_APPROACH))  # type: ignore[union-attr]
+    refuse(monkeypatch, board, SET_FW_APPROACH, times=99)
     assert Upload(station, plan(3)).run() is MissionResult.DENIED
-    assert firmware.stored == []  # type: ignore[union-attr]
+    assert board._firmware.stored == []  # type: ignore[union-attr]
 
 
 def test_rally_points_keep_their_approaches_in_any_order() -> None:
@@ -114,16 +102,7 @@ def test_a_refused_rally_point_leaves_the_old_points_with_their_approaches(monke
     board, _, station = board_with(version="9.1.0")
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
     set_approaches(board, 0, 1, 2)
-    firmware, refusals = board._firmware, [True]
-    answer = firmware.answer  # type: ignore[union-attr]
-
-    def refusing_third(command: int, payload: bytes, now: float) -> bytes | None:
-        if command == SET_SAFEHOME and payload[0] == 2 and refusals:
-            refusals.pop()
-            return MspFrame(Direction.ERROR, command, b"", is_v2=True).encode()
-        return answer(command, payload, now)
-
-    monkeypatch.setattr(firmware, "answer", refusing_third)
+    refuse(monkeypatch, board, SET_SAFEHOME, times=1, number=2)
     new = [place(Command.RALLY_POINT, north) for north in (2000, 3000, 4000)]
     assert Upload(station, new, mission_type=RALLY).run() is MissionResult.DENIED
     assert "old kept" in " ".join(station.texts())

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as messages
 from protocols.mission_item import Command, MissionItem, MissionResult
 from protocols.msp.frame import Direction, MspFrame
 from protocols.msp.inav_places import GEOZONE, GEOZONE_FEATURE, SAFEHOME, SET_GEOZONE, SET_GEOZONE_VERTEX, SET_SAFEHOME
+from simulator.board.msp_board import MspBoard
 from simulator.board.options import Faults
 from simulator.commands.fc_kinds import make_board
 from simulator.inav.places import SET_FEATURE
@@ -154,6 +155,21 @@ def test_a_lost_reply_to_a_corner_does_not_leave_a_corner_twice(monkeypatch: pyt
     assert len(used) == len(FIELD) + 2
 
 
+def refuse(
+    monkeypatch: pytest.MonkeyPatch, board: MspBoard, command: int, times: int, number: int | None = None
+) -> None:
+    """The board refuses the next requests with this command, and number as the first byte."""
+    answer, left = board._firmware.answer, [times]  # type: ignore[union-attr]
+
+    def answer_or_refuse(asked: int, payload: bytes, now: float) -> bytes | None:
+        if asked != command or not left[0] or number not in (None, payload[0]):
+            return answer(asked, payload, now)
+        left[0] -= 1
+        return MspFrame(Direction.ERROR, asked, b"", is_v2=True).encode()
+
+    monkeypatch.setattr(board._firmware, "answer", answer_or_refuse)
+
+
 @pytest.mark.parametrize(
     ("kind", "old", "new", "setter"),
     [
@@ -166,18 +182,7 @@ def test_after_a_refusal_the_old_list_is_back(
 ) -> None:
     board, world, station = board_with()
     assert Upload(station, old, mission_type=kind).run() is ACCEPTED
-    firmware = board._firmware
-    answer, refusals = firmware.answer, [True]  # type: ignore[union-attr]
-
-    def refusing(command: int, payload: bytes, now: float) -> bytes | None:
-        if command == setter and refusals:
-            refusals.pop()
-            return MspFrame(Direction.ERROR, command, b"", is_v2=True).encode()
-        return answer(command, payload, now)
-
-    if kind == FENCE:
-        refusals.extend([True, True])
-    monkeypatch.setattr(firmware, "answer", refusing)
+    refuse(monkeypatch, board, setter, times=3 if kind == FENCE else 1)
     assert Upload(station, new, mission_type=kind).run() is MissionResult.DENIED
     assert "old kept" in " ".join(station.texts())
     assert read(station, kind) == numbered(old)

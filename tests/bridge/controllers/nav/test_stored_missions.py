@@ -64,7 +64,7 @@ class Bench:
         held = self.world.bridge.missions.held
         self.faults.armed = False
         self.world.run(3)
-        return [] if held is None else [record.pack() for record in held.records]
+        return records(held)
 
     def text(self) -> str:
         """All texts so far; long ones arrive in pieces."""
@@ -76,11 +76,12 @@ def sets(*sizes: int) -> list[list[bytes]]:
     return [packed(plan(size + 1, shift)) for shift, size in enumerate(sizes, 1)]
 
 
-def others_of(bench: Bench) -> list[list[bytes]]:
-    def packed_records(held: HeldMission) -> list[bytes]:
-        return [record.pack() for record in held.records]
+def records(mission: HeldMission | None) -> list[bytes]:
+    return [] if mission is None else [record.pack() for record in mission.records]
 
-    return [packed_records(held) for held in bench.world.bridge.missions.others]
+
+def others_of(bench: Bench) -> list[list[bytes]]:
+    return [records(held) for held in bench.world.bridge.missions.others]
 
 
 # -- several missions ----------------------------------------------------------------------------------------
@@ -193,7 +194,7 @@ def test_a_list_that_is_not_loaded_yet_is_not_read_as_empty(command: int, lost: 
     requests.clear()
     while isinstance(held := bench.world.pull(), Refusal):
         pass
-    assert [record.pack() for record in held.records] == sets(4)[0]
+    assert records(held) == sets(4)[0]
     bench.world.run(2)
     assert "Saved mission loaded, not written by naze-bridge: 4 records" in bench.text()
 
