@@ -10,7 +10,7 @@ import pytest
 
 from storage.mission_store import DAMAGED, MissionStore, ReceivedMission, open_store
 from storage.store_error import StoreError
-from tests.support.sample_missions import mission, received
+from tests.support.sample_missions import intact, mission, received
 
 NOW = 1_767_323_045.9  # 2026-01-02 03:04:05 UTC
 ASIDE = "missions.db.corrupt-20260102-030405"
@@ -69,9 +69,7 @@ def test_a_truncated_file_is_set_aside(path: Path, sound: Path, size: int) -> No
 def test_an_empty_file_becomes_a_new_store(path: Path, content: bytes) -> None:
     """SQLite also treats a file of one byte as empty."""
     path.write_bytes(content)
-    opened = open_store(path, NOW)
-    with opened.store as store:
-        assert opened.set_aside is None
+    with intact(path) as store:
         assert_works(store)
 
 
@@ -90,9 +88,7 @@ def killed(path: Path, sound: Path) -> bytes:
 
 
 def test_an_intact_log_is_applied(path: Path, killed: bytes) -> None:
-    opened = open_store(path, NOW)
-    with opened.store as store:
-        assert opened.set_aside is None
+    with intact(path) as store:
         assert len(store.list(99)) == MISSIONS + 2
 
 
@@ -154,9 +150,7 @@ def test_an_added_view_is_not_damage(path: Path, sound: Path) -> None:
     connection = sqlite3.connect(path)
     connection.execute("CREATE VIEW refused AS SELECT number FROM missions WHERE outcome = 'REFUSED'")
     connection.close()
-    opened = open_store(path, NOW)
-    with opened.store as store:
-        assert opened.set_aside is None
+    with intact(path) as store:
         assert len(store.list(99)) == MISSIONS
 
 

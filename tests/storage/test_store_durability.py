@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from storage.mission_store import open_store
-from tests.support.sample_missions import mission, received
+from tests.support.sample_missions import intact, mission, received
 
 #: `make soak` repeats it 200 times.
 KILLS = int(os.environ.get("STORE_KILLS", "8"))
@@ -54,9 +54,7 @@ def test_kill_9_keeps_everything_acknowledged(tmp_path: Path, capsys: pytest.Cap
         # An incomplete last line does not count.
         acknowledged.update((int(number), outcome) for number, outcome in map(str.split, filter(_whole, lines)))
 
-        opened = open_store(path, now=0.0)
-        with opened.store as store:
-            assert opened.set_aside is None
+        with intact(path) as store:
             for number, outcome in acknowledged.items():
                 stored = store.get(number)
                 assert stored is not None
@@ -92,9 +90,7 @@ def test_a_power_cut_damages_only_unacknowledged_data(tmp_path: Path) -> None:
         copy.parent.mkdir()
         copy.write_bytes(main)
         copy.with_name("missions.db-wal").write_bytes(synced + torn)
-        opened = open_store(copy, now=0.0)
-        with opened.store as store:
-            assert opened.set_aside is None
+        with intact(copy) as store:
             assert received(store, number) == mission(1)
             assert store.add(mission(3)) > number
         shutil.rmtree(copy.parent)
@@ -107,9 +103,7 @@ def test_a_power_cut_before_the_first_commit_is_not_damage(tmp_path: Path, size:
     with open_store(path, now=0.0).store as store:
         store.add(mission(1))
     path.with_name("missions.db-wal").write_bytes(bytes(size))
-    opened = open_store(path, now=0.0)
-    with opened.store as store:
-        assert opened.set_aside is None
+    with intact(path) as store:
         assert [summary.number for summary in store.list(9)] == [1]
 
 

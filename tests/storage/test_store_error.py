@@ -11,7 +11,7 @@ import pytest
 
 from storage.mission_store import open_store
 from storage.store_error import StoreError
-from tests.support.sample_missions import mission, received
+from tests.support.sample_missions import intact, mission, received
 
 
 def run(script: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -64,9 +64,7 @@ def test_a_full_disk_is_reported_and_keeps_earlier_missions(tmp_path: Path, limi
     count = int(added)
     assert count > 2
     assert int(listed) == count
-    opened = open_store(path, now=0.0)
-    with opened.store as store:
-        assert opened.set_aside is None
+    with intact(path) as store:
         for number in range(1, count + 1):
             assert received(store, number) == mission(number, items=100)
         last = store.list(1)[0]

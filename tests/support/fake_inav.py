@@ -29,6 +29,8 @@ class FakeInav(MspFake):
         self.armed = False
         self.writes = self.saves = 0
         self.drop = drop
+        #: True for a record that it acknowledges and does not store.
+        self.ignores: Callable[[bytes], bool] = lambda _record: False
         self.nav = (0, 0, 0, 0, 0, 0)
         self.commands: list[int] = []
         self._frames = MspParser()
@@ -59,7 +61,8 @@ class FakeInav(MspFake):
                 return bytes((0, self.capacity, self.is_valid, len(self.records)))
             case Nav.SET_WP:
                 self.writes += frame.payload[0] <= self.capacity
-                self.store(frame.payload[0], frame.payload[1:])
+                if not self.ignores(frame.payload[1:]):
+                    self.store(frame.payload[0], frame.payload[1:])
                 return b""
             case Nav.WP:
                 return bytes((frame.payload[0],)) + self.read(frame.payload[0])

@@ -2,8 +2,11 @@
 
 import random
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
-from storage.mission_store import MissionStore, ReceivedMission
+from storage.mission_store import MissionStore, ReceivedMission, open_store
 
 
 def mission(tag: int, items: int = 3) -> ReceivedMission:
@@ -23,6 +26,15 @@ def mission(tag: int, items: int = 3) -> ReceivedMission:
         roi_commands={tag: 201},
         sent_seqs=[*range(items)],
     )
+
+
+@contextmanager
+def intact(path: Path) -> Iterator[MissionStore]:
+    """The store at this path, which is opened without loss."""
+    opened = open_store(path, now=0.0)
+    with opened.store as store:
+        assert opened.set_aside is None
+        yield store
 
 
 def received(store: MissionStore, number: int) -> ReceivedMission:
