@@ -22,9 +22,10 @@ class ShareProgram:
         self.program = Program(name, name.partition(":")[0], self._arrived, self._close, may_write=may_write)
         world.bridge.program_joined(self.program)
 
-    def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False) -> None:
+    def ask(self, command: int, payload: bytes = b"", *, is_v2: bool = False, wait_s: float = 0.0) -> None:
         frame = MspFrame(Direction.REQUEST, command, payload, is_v2=is_v2)
         self.world.receive_from_program(self.program, frame.encode())
+        self.world.run(wait_s)
 
     def wait_for(self, command: int, payload: bytes = b"", seconds: float = 4.0, *, is_v2: bool = False) -> MspFrame:
         """Ask, and wait for the reply."""

@@ -519,10 +519,14 @@ class GroundStation:
         self._transmit(lambda: self.world.receive_from(self, data))
         self.world.run(wait_s)
 
-    def stay_connected(self) -> None:
+    def stay_connected(self) -> "GroundStation":
         """Send a heartbeat each second from now on."""
+        self._beat()
+        return self
+
+    def _beat(self) -> None:
         self.send(self.heartbeat)
-        self.world.after(1.0, self.stay_connected)
+        self.world.after(1.0, self._beat)
 
     def sign(self, key: bytes, timestamp: int, link_id: int = 0) -> None:
         signing = self._mavlink.signing

@@ -87,8 +87,7 @@ def test_telemetry_keeps_four_fifths_of_the_rate_while_the_list_is_read(kind: st
     """At the rates that Mission Planner asks for."""
     world = World(speeds=(115200,), peer=None if kind is None else make_board(kind))
     world.wait_until(lambda world: world.is_found, 40)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     for stream, rate_hz in ((2, 2), (6, 2), (10, 10), (11, 4), (12, 4), (1, 2), (3, 2)):
         station.send(messages.MAVLink_request_data_stream_message(1, 1, stream, rate_hz, 1))
     settings = inside(world.bridge).board_settings

@@ -67,8 +67,7 @@ def sealed(make: Callable[[], object], memory: SettingsMemory | None = None) -> 
     """A world whose board's settings were read."""
     world = ready_world(peer=make(), memory=memory, within_s=40)
     world.wait_until(lambda world: world.inside.board_settings.known.state is not None, 60)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     return world, station
 
 

@@ -382,8 +382,7 @@ def test_what_is_requested_before_the_settings_are_read_waits_for_them() -> None
 
 def test_a_station_with_a_shorter_list_gets_the_whole_list_later() -> None:
     world = World(powered=False, speeds=(115200,))
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     assert len(parameter_list(world, station)) == OWN - 1
     station.take()
     world.power_on()
@@ -440,8 +439,7 @@ def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str)
     world = World(faults=faults, peer=None if kind == "harakiri" else make_board(kind, faults=faults))
     world.wait_until(lambda w: w.is_found, 20)
     table = SettingsClient(world).wait_read()
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     names = {value[0] for value in values(parameter_list(world, station))}
     setting = next(
         each for each in table if each.name.upper() in names and each.kind is ValueKind.INTEGER and not each.fixed

@@ -70,8 +70,7 @@ def test_a_reply_with_the_text_of_the_request_is_not_an_echo() -> None:
     world, program = ready(board)
     world.run(5)  # the bridge has asked for settings itself, and given up
     name = b"nav_wp_multi_mission_index\0"
-    program.ask(SETTING_INFO, name, is_v2=True)
-    world.run(0.02)
+    program.ask(SETTING_INFO, name, is_v2=True, wait_s=0.02)
     reply = MspFrame(Direction.REPLY, SETTING_INFO, bytes(12) + name).encode()
     world.receive_from_fc(reply[:-6])
     world.receive_from_fc(reply[-6:])
@@ -111,8 +110,7 @@ def test_a_refused_change_disconnects_and_is_reported(
     world, program = ready(board, may_write=may_write)
     station = GroundStation(world)
     station.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), wait_s=1)
-    program.ask(*request_)
-    world.run(1)
+    program.ask(*request_, wait_s=1)
     assert program.closed_at is not None
     assert program.replies == []
     assert request_[0] not in board.commands
@@ -128,14 +126,12 @@ def test_a_program_that_repeats_a_refused_change_is_reported_once() -> None:
     station = GroundStation(world)
     station.send(station.heartbeat, wait_s=1)
     for port in range(20):
-        ShareProgram(world, f"192.0.2.7:{port}").ask(SET_PID, bytes(30))
-        world.run(0.5)
+        ShareProgram(world, f"192.0.2.7:{port}").ask(SET_PID, bytes(30), wait_s=0.5)
     assert sum("192.0.2.7" in text for text in station.texts()) == 1
     assert len(world.events("share.refused")) == sum(world.inside.sharing.refused.values()) == 20
     # Forged addresses do not flood the stations with texts.
     for host in range(200):
-        ShareProgram(world, f"198.51.100.{host}:1").ask(SET_PID, bytes(30))
-        world.run(0.05)
+        ShareProgram(world, f"198.51.100.{host}:1").ask(SET_PID, bytes(30), wait_s=0.05)
     assert 1 <= sum("198.51.100." in text for text in station.texts()) <= 10
 
 
@@ -166,8 +162,7 @@ def test_a_change_is_forwarded_after_a_look_at_the_arm_flag() -> None:
     at = board.commands.index(SET_SAFEHOME)
     assert board.commands[at - 1] == 101  # STATUS
     board.armed = True  # and no poll has reported it yet
-    program.ask(SET_SAFEHOME, bytes(10))
-    world.run(1)
+    program.ask(SET_SAFEHOME, bytes(10), wait_s=1)
     assert board.commands.count(SET_SAFEHOME) == 1
     assert program.closed_at is not None
     assert [event.facts["why"] for event in world.events("share.refused")] == ["armed"]
@@ -214,8 +209,7 @@ def test_an_empty_setter_is_not_a_read(
     before = [ShareProgram(world).wait_for(command) for command in settings]
     for setter in setters:
         for command, payload in ((WP, poison), (setter, b"")):
-            ShareProgram(world).ask(command, payload)
-            world.run(1)
+            ShareProgram(world).ask(command, payload, wait_s=1)
     after = [ShareProgram(world).wait_for(command) for command in settings]
     assert after == before
     assert {reply.direction for reply in after} == {Direction.REPLY}

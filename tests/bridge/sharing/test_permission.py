@@ -99,8 +99,7 @@ def test_a_waiting_read_is_forwarded_once_the_craft_has_landed() -> None:
     world = ready("harakiri")
     arm(world)
     program = ShareProgram(world)
-    program.ask(PID)
-    world.run(1)
+    program.ask(PID, wait_s=1)
     world.naze.faults.armed = False
     world.run(1.5)
     assert [frame.direction for _, frame in program.replies] == [Direction.REPLY]
@@ -124,10 +123,8 @@ def test_a_refused_write_is_not_a_warning(is_armed: bool) -> None:
     world = ready("harakiri")
     if is_armed:
         arm(world)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     world.run(2)
-    ShareProgram(world).ask(202, bytes(30))
-    world.run(1)
+    ShareProgram(world).ask(202, bytes(30), wait_s=1)
     texts = [message for message in station.messages("STATUSTEXT") if "SET_PID refused" in message.text]
     assert [message.severity for message in texts] == [5], "MAV_SEVERITY_NOTICE"

@@ -30,8 +30,7 @@ FLOODS = {
 def flying_station(kind: str, baud: int = 115200) -> tuple[World, GroundStation]:
     peer = None if kind == "harakiri" else make_board(kind, MspOptions(baud=baud))
     world = World(SimOptions(baud=baud), speeds=(baud,), peer=peer)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     world.wait_ready(60)
     world.run(3)
     return world, station
@@ -197,8 +196,7 @@ def test_a_program_that_waits_too_long_is_disconnected() -> None:
     program, other = ShareProgram(world), ShareProgram(world, "192.0.2.9:1")
     asked_at = world.now
     program.ask(PID)
-    other.ask(PID)
-    world.run(4)
+    other.ask(PID, wait_s=4)
     assert outcome == []
     assert program.closed_at == pytest.approx(asked_at + 3, abs=0.3)
     assert program.replies == other.replies == []
@@ -215,7 +213,6 @@ def test_without_a_flight_controller_requests_wait_for_it() -> None:
     assert [frame.direction for _, frame in program.replies] == [Direction.REPLY]
     world.power_off()
     world.run(5)
-    program.ask(PID)
-    world.run(4)
+    program.ask(PID, wait_s=4)
     assert len(program.replies) == 1
     assert program.closed_at is not None

@@ -40,12 +40,14 @@ class CalibrationPages:
     def command(self, number: int, *params: float) -> None:
         self.station.send(m.MAVLink_command_long_message(1, 1, number, 0, *params, *[0] * (7 - len(params))))
 
-    def start_compass(self) -> None:
+    def start_compass(self, wait_s: float = 0.0) -> None:
         """*Start* on the compass page."""
         self.command(START_MAG_CAL, 0, 1, 1)
+        self.world.run(wait_s)
 
-    def start_accelerometer(self, kind: int) -> None:
+    def start_accelerometer(self, kind: int, wait_s: float = 0.0) -> None:
         self.command(m.MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, kind)
+        self.world.run(wait_s)
 
     def acks(self, number: int) -> list[int]:
         return [ack.result for ack in self.station.messages("COMMAND_ACK") if ack.command == number]
@@ -86,8 +88,7 @@ class CalibrationPages:
 
 def test_the_compass_page_follows_a_harakiri_to_the_end() -> None:
     pages = CalibrationPages()
-    pages.start_compass()
-    pages.world.run(1)
+    pages.start_compass(wait_s=1)
     assert pages.acks(START_MAG_CAL) == [ACCEPTED]
     assert any("Turn the craft" in text for text in pages.station.texts())
     pages.world.run(59)
@@ -109,12 +110,10 @@ def test_cancelling_a_frozen_compass_calibration_is_refused() -> None:
     pages = CalibrationPages()
     pages.command(CANCEL_MAG_CAL)  # QGroundControl asks in this way if there is such a calibration
     pages.world.run(0.2)
-    pages.start_compass()
-    pages.world.run(3)
+    pages.start_compass(wait_s=3)
     pages.command(CANCEL_MAG_CAL)
     pages.start_compass()
-    pages.start_accelerometer(LEVEL)
-    pages.world.run(1)
+    pages.start_accelerometer(LEVEL, wait_s=1)
     assert pages.acks(CANCEL_MAG_CAL) == [ACCEPTED, DENIED]
     assert pages.acks(START_MAG_CAL) == [ACCEPTED, IN_PROGRESS]
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [TEMPORARILY_REJECTED]
@@ -123,8 +122,7 @@ def test_cancelling_a_frozen_compass_calibration_is_refused() -> None:
 
 def test_a_compass_calibration_cut_by_a_reset_has_failed() -> None:
     pages = CalibrationPages()
-    pages.start_compass()
-    pages.world.run(10)
+    pages.start_compass(wait_s=10)
     pages.world.power_off()
     pages.world.run(1)
     pages.world.power_on()
@@ -135,8 +133,7 @@ def test_a_compass_calibration_cut_by_a_reset_has_failed() -> None:
 
 def test_a_board_that_stays_silent_is_lost() -> None:
     pages = CalibrationPages()
-    pages.start_compass()
-    pages.world.run(5)
+    pages.start_compass(wait_s=5)
     pages.world.power_off()
     pages.world.run(350)
     pages.assert_nothing_was_lost()
@@ -148,8 +145,7 @@ def test_a_board_that_stays_silent_is_lost() -> None:
 @pytest.mark.parametrize("kind", [WIZARD, LEVEL, SIMPLE])
 def test_the_accelerometer_page_ends_with_success_after_the_restart(kind: int) -> None:
     pages = CalibrationPages()
-    pages.start_accelerometer(kind)
-    pages.world.run(9)
+    pages.start_accelerometer(kind, wait_s=9)
     assert pages.wizard_result == ""
     pages.world.run(21)
     assert pages.wizard_result == "Accel calibration successful"
@@ -163,15 +159,13 @@ def test_the_accelerometer_page_ends_with_success_after_the_restart(kind: int) -
 
 def test_mission_planner_sees_at_once_that_a_calibrating_craft_is_not_ready() -> None:
     pages = CalibrationPages()
-    pages.start_accelerometer(WIZARD)
-    pages.world.run(2)
+    pages.start_accelerometer(WIZARD, wait_s=2)
     assert not pages.screens.mission_planner.ready.at(pages.world.now)
 
 
 def test_another_loss_afterwards_is_reported() -> None:
     pages = CalibrationPages()
-    pages.start_accelerometer(LEVEL)
-    pages.world.run(30)
+    pages.start_accelerometer(LEVEL, wait_s=30)
     pages.world.power_off()
     pages.world.run(6)
     assert any("Flight controller lost" in text for text in pages.station.texts())
@@ -179,29 +173,24 @@ def test_another_loss_afterwards_is_reported() -> None:
 
 def test_a_multiwii_calibrates_while_it_answers() -> None:
     pages = CalibrationPages(make_board("multiwii", faults=Faults(boxes=0)))
-    pages.start_compass()
-    pages.world.run(20)
+    pages.start_compass(wait_s=20)
     assert pages.results == []
     pages.world.run(15)
     assert pages.results == [m.MAG_CAL_SUCCESS]
     pages.station.take()
-    pages.start_accelerometer(SIMPLE)
-    pages.world.run(8)
+    pages.start_accelerometer(SIMPLE, wait_s=8)
     assert pages.wizard_result == "Accel calibration successful"
     assert set(pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION)) == {IN_PROGRESS, ACCEPTED}
     # The next button is not answered by the result of the last.
-    pages.start_accelerometer(LEVEL)
-    pages.world.run(6)
+    pages.start_accelerometer(LEVEL, wait_s=6)
     pages.station.take()
-    pages.start_accelerometer(SIMPLE)
-    pages.world.run(2)
+    pages.start_accelerometer(SIMPLE, wait_s=2)
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [IN_PROGRESS]
 
 
 def test_the_usual_time_counts_from_the_boards_reply() -> None:
     pages = CalibrationPages(make_board("multiwii", faults=Faults(boxes=0)))
-    pages.start_compass()
-    pages.world.run(35)
+    pages.start_compass(wait_s=35)
     times = {message.get_type(): at for at, message in pages.station.received}
     # MultiWii collects compass values for 30 s.
     assert times["MAG_CAL_REPORT"] - times["COMMAND_ACK"] >= 31.0
@@ -209,7 +198,6 @@ def test_the_usual_time_counts_from_the_boards_reply() -> None:
 
 def test_an_unsupported_calibration_is_refused_with_a_text() -> None:
     pages = CalibrationPages(FakeInav())
-    pages.start_accelerometer(WIZARD)
-    pages.world.run(0.5)
+    pages.start_accelerometer(WIZARD, wait_s=0.5)
     assert pages.acks(m.MAV_CMD_PREFLIGHT_CALIBRATION) == [UNSUPPORTED]
     assert any("INAV Configurator" in text for text in pages.station.texts())

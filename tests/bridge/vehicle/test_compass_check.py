@@ -32,16 +32,14 @@ def test_near_the_poles_the_declination_is_unknown() -> None:
 
 def compass_texts(world: World, name: str) -> list[str]:
     """What a station that connects now is told about the compass."""
-    station = GroundStation(world, name)
-    station.stay_connected()
+    station = GroundStation(world, name).stay_connected()
     world.run(5)
     return [text for text in station.texts() if "Compass" in text]
 
 
 def test_a_wrong_declination_is_reported_once_until_it_is_set() -> None:
     world, client = ready(BOARDS["patched Harakiri"])
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     client.change("mag_dec", -2548)
     world.run(40)
     expected = "Compass 29 deg off: set mag_dec to 300"
@@ -56,8 +54,7 @@ def test_a_wrong_declination_is_reported_once_until_it_is_set() -> None:
 def test_the_compass_warning_is_not_repeated_while_the_craft_moves(armed: bool) -> None:
     faults = Faults()
     world, client = ready(BOARDS["patched Harakiri"], faults)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     client.change("mag_dec", -2548)
     world.run(10)
     faults.armed = armed

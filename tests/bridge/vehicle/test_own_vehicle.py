@@ -84,8 +84,7 @@ def test_home_before_arming_is_the_position(tree: Tree) -> None:
 
 def test_an_emergency_landing_of_an_inav_is_reported_once() -> None:
     world, board = bench()
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     board.armed = True
     for state in (NavState.RTH_ENROUTE, NavState.EMERGENCY_LANDING, NavState.EMERGENCY_LANDING):
         board.nav = (NavMode.RTH, state, NavAction.RTH, 1, 0, 0)

@@ -114,8 +114,7 @@ def results(station: GroundStation) -> list[int]:
 
 def test_the_craft_flies_to_the_item_and_continues() -> None:
     flight = Flight().begin()
-    other = GroundStation(flight.world, "other", sysid=254)
-    other.stay_connected()
+    other = GroundStation(flight.world, "other", sysid=254).stay_connected()
     flight.world.run(1)
     flight.station.received.clear()
     flight.ask(set_current(3))

@@ -97,8 +97,7 @@ def test_a_refusal_of_a_routine_request_does_not_silence_the_pilots() -> None:
 def test_a_lost_text_reaches_mission_planner_later() -> None:
     """Write Fast, and both its closing ack and the first text are lost: it has shown a success."""
     world = ready_world()
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_ALL, 2, 1), wait_s=2)
     station.send(m.MAVLink_mission_count_message(1, 1, 5))
     station.send(m.MAVLink_mission_item_int_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 453838000, 84733000, 20))

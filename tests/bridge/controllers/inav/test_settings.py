@@ -55,8 +55,7 @@ def test_a_list_is_complete_right_after_a_start_if_the_board_is_known() -> None:
     world = World(speeds=(19200,), peer=board, memory=memory)
     board.receive(request(COMMON_SET_SETTING, encode_about_name("nav_rth_altitude") + b"\x14\5"), 0.0)
     world.wait_until(lambda world: world.is_found, 20)
-    station = GroundStation(world)
-    station.stay_connected()
+    station = GroundStation(world).stay_connected()
     station.send(m.MAVLink_param_request_list_message(1, 1), wait_s=8)
     listed = {each.param_id: each.param_value for each in station.messages("PARAM_VALUE")}
     assert len(listed) == station.messages("PARAM_VALUE")[-1].param_count > count - 60
