@@ -4,6 +4,7 @@
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
@@ -82,8 +83,49 @@ def item_message(seq: int, sent: MissionItem, *, as_int: bool = True, mission_ty
     return make(1, 1, seq, sent.frame, sent.command, 0, 1, *params, x, y, sent.alt_m, mission_type)
 
 
-class Upload:
-    """A ground station that uploads a mission: it answers each request and repeats its last message while it waits."""
+class Transfer:
+    """A ground station's end of a transfer: it repeats its last message while it waits, at most `tries` times."""
+
+    def __init__(self, station: GroundStation, *, as_int: bool, repeat_s: float, tries: int, mission_type: int) -> None:
+        self.station, self.as_int = station, as_int
+        self.result: MissionResult | None = None
+        self.gave_up = False
+        self._repeat_s, self._tries, self._type = repeat_s, tries, mission_type
+        self._turn = 0
+        station.on_message.append(self._react)
+
+    @property
+    def is_over(self) -> bool:
+        return self.result is not None or self.gave_up
+
+    def stop(self) -> None:
+        """Fall silent forever, like a crashed ground station."""
+        self.gave_up = True
+
+    def _react(self, message: Message) -> None:
+        is_ours = self.station.is_target_of(message) and getattr(message, "mission_type", MISSION) == self._type
+        if is_ours and not self.is_over:
+            self._received(message)
+
+    def _received(self, message: Message) -> None:
+        raise NotImplementedError
+
+    def _send(self, what: Callable[[], None]) -> None:
+        self._turn += 1
+        self._repeat(what, self._turn, 0)
+
+    def _repeat(self, what: Callable[[], None], turn: int, silent: int) -> None:
+        if self.is_over or turn != self._turn:
+            return
+        if silent > self._tries:
+            self.gave_up = True
+            return
+        what()
+        self.station.world.after(self._repeat_s, lambda: self._repeat(what, turn, silent + 1))
+
+
+class Upload(Transfer):
+    """A ground station that uploads a mission: it answers each request."""
 
     def __init__(
         self,
@@ -95,69 +137,29 @@ class Upload:
         tries: int = 11,
         mission_type: int = MISSION,
     ) -> None:
-        self._type = mission_type
-        self.station, self.items, self.as_int = station, list(items), as_int
-        self.result: MissionResult | None = None
+        super().__init__(station, as_int=as_int, repeat_s=repeat_s, tries=tries, mission_type=mission_type)
+        self.items = list(items)
         self.requested: list[int] = []
-        self.gave_up = False
-        self._repeat_s, self._tries = repeat_s, tries
-        self._silent = 0
-        self._last: Callable[[], None] = self._count
-        self._turn = 0
-        station.on_message.append(self._react)
-        self._send(self._count)
-
-    @property
-    def is_over(self) -> bool:
-        return self.result is not None or self.gave_up
+        self._send(lambda: self.station.send(count_message(len(self.items), self._type)))
 
     def run(self, seconds: float = 60.0) -> MissionResult | None:
         """Run the world until the upload has ended."""
         self.station.world.run_until(lambda _: self.is_over, seconds)
         return self.result
 
-    def stop(self) -> None:
-        """Fall silent forever, like a crashed ground station."""
-        self.gave_up = True
-
-    def _count(self) -> None:
-        self.station.send(count_message(len(self.items), self._type))
-
     def _item(self, seq: int) -> None:
         self.station.send(item_message(seq, self.items[seq], as_int=self.as_int, mission_type=self._type))
 
-    def _react(self, message: Message) -> None:
-        if self.is_over or not self.station.is_target_of(message):
-            return
+    def _received(self, message: Message) -> None:
         match message.get_type():
-            case "MISSION_REQUEST" | "MISSION_REQUEST_INT" if message.mission_type == self._type:
+            case "MISSION_REQUEST" | "MISSION_REQUEST_INT":
                 self.requested.append(message.seq)
-                self._silent = 0
-                self._send(lambda seq=message.seq: self._item(seq))  # type: ignore[misc]
-            case "MISSION_ACK" if message.mission_type == self._type:
+                self._send(partial(self._item, message.seq))
+            case "MISSION_ACK":
                 self.result = MissionResult(message.type)
 
-    def _send(self, what: Callable[[], None]) -> None:
-        self._last = what
-        self._turn += 1
-        what()
-        self._repeat_later(self._turn)
 
-    def _repeat_later(self, turn: int) -> None:
-        def repeat() -> None:
-            if self.is_over or turn != self._turn:
-                return
-            self._silent += 1
-            if self._silent > self._tries:
-                self.gave_up = True
-                return
-            self._last()
-            self._repeat_later(turn)
-
-        self.station.world.after(self._repeat_s, repeat)
-
-
-class Download:
+class Download(Transfer):
     """A ground station that downloads the mission."""
 
     def __init__(
@@ -169,44 +171,26 @@ class Download:
         tries: int = 7,
         mission_type: int = MISSION,
     ) -> None:
-        self._type = mission_type
-        self.station, self.as_int = station, as_int
+        super().__init__(station, as_int=as_int, repeat_s=repeat_s, tries=tries, mission_type=mission_type)
         self.count: int | None = None
         self.items: list[MissionItem] = []
-        self.result: MissionResult | None = None
-        self.gave_up = False
-        self._repeat_s, self._tries = repeat_s, tries
-        self._turn = 0
-        station.on_message.append(self._react)
-        self._ask()
+        self._send(self._ask)
 
     @property
     def is_over(self) -> bool:
-        return self.gave_up or self.result is not None or self.count == len(self.items)
+        return super().is_over or self.count == len(self.items)
 
     def run(self, seconds: float = 60.0) -> list[MissionItem]:
         self.station.world.run_until(lambda _: self.is_over, seconds)
         return self.items
 
     def _ask(self) -> None:
-        self._turn += 1
-        self._repeat(self._turn, 0)
-
-    def _repeat(self, turn: int, silent: int) -> None:
-        if self.is_over or turn != self._turn:
-            return
-        if silent > self._tries:
-            self.gave_up = True
-            return
         if self.count is None:
             self.station.send(list_message(self._type))
         else:
             self.station.send(request_message(len(self.items), as_int=self.as_int, mission_type=self._type))
-        self.station.world.after(self._repeat_s, lambda: self._repeat(turn, silent + 1))
 
-    def _react(self, message: Message) -> None:
-        if self.is_over or not self.station.is_target_of(message) or getattr(message, "mission_type", 0) != self._type:
-            return
+    def _received(self, message: Message) -> None:
         match message.get_type():
             case "MISSION_COUNT" if self.count is None:
                 self.count = message.count
@@ -218,10 +202,7 @@ class Download:
                 self.result = MissionResult(message.type)
             case _:
                 return
-        self._go_on()
-
-    def _go_on(self) -> None:
         if not self.is_over:
-            self._ask()
+            self._send(self._ask)
         elif self.result is None:
             self.station.send(ack_message(MissionResult.ACCEPTED, self._type))

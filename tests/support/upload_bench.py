@@ -73,12 +73,10 @@ def partial_list_message(mission_type: int = 0) -> Message:
 def assert_refusal_is_repeated(world: World, station: GroundStation, result: MissionResult) -> None:
     """Mission Planner continues after any ack to its count; its further messages get the same refusal."""
     for seq in (0, 1, 0, 999):
-        station.take()
-        station.send(item_message(seq, OLD[1]), wait_s=0.05)
+        station.ask(item_message(seq, OLD[1]), wait_s=0.05)
         assert acks(station) == [result]
         assert requested(station) == []
-    station.take()
-    station.send(partial_list_message(), wait_s=0.05)
+    station.ask(partial_list_message(), wait_s=0.05)
     assert acks(station) == [result]
     assert A.INVALID_SEQUENCE not in acks(station)
     assert state(world) is None

@@ -245,13 +245,15 @@ class World:
             self._step(end)
         return True
 
-    def wait_until(self, done: "Callable[[World], bool]", seconds: float) -> float:
-        """Like `run_until`, but fail on timeout; return the elapsed time."""
+    def wait_until(self, done: "Callable[[World], bool]", seconds: float, *, then_s: float = 0.0) -> float:
+        """Like `run_until`, but fail on timeout; return the elapsed time. Afterwards `then_s` pass."""
         began = self.now
         assert self.run_until(done, seconds), f"not within {seconds} s, state {self.inside.session.state}"
-        return self.now - began
+        elapsed_s = self.now - began
+        self.run(then_s)
+        return elapsed_s
 
-    def wait_ready(self, seconds: float = 20.0) -> float:
+    def wait_ready(self, seconds: float = 20.0, *, then_s: float = 0.0) -> float:
         """Wait until the flight controller is found and its list is read; its settings may be read after that."""
         settings = self.inside.board_settings
 
@@ -259,7 +261,7 @@ class World:
             is_idle = not world.bridge.is_busy or settings._reading is not None
             return world.is_found and is_idle and not world.inside.runner.needs_line
 
-        return self.wait_until(is_ready, seconds)
+        return self.wait_until(is_ready, seconds, then_s=then_s)
 
     def receive_from_fc(self, data: bytes) -> None:
         """Let the bridge read bytes that are not from the simulated board."""
@@ -518,6 +520,12 @@ class GroundStation:
         data = self.pack(message)
         self._transmit(lambda: self.world.receive_from(self, data))
         self.world.run(wait_s)
+
+    def ask(self, message: Message, *, wait_s: float = 0.0) -> list[Message]:
+        """Forget what was received, and send a message; what comes in the meantime."""
+        self.take()
+        self.send(message, wait_s=wait_s)
+        return self.messages()
 
     def stay_connected(self) -> "GroundStation":
         """Send a heartbeat each second from now on."""

@@ -42,8 +42,7 @@ def test_a_new_flight_controller_needs_only_a_profile() -> None:
     world = World(peer=board, speeds=(115200,), profiles=(TOY, *PROFILES))
     station = GroundStation(world)
     world.bridge.add_default_peer(station.peer, until_answered=False)
-    world.wait_until(lambda w: w.kind is TOY, 5)
-    world.run(2)
+    world.wait_until(lambda w: w.kind is TOY, 5, then_s=2)
     assert "Found Toy 1.0" in station.texts()
     assert station.messages("HEARTBEAT")[-1].base_mode & 128, "its ARM box is the second one"
     assert Upload(station, waypoints(3)).run() is MissionResult.UNSUPPORTED

@@ -34,8 +34,7 @@ def station_of(world: World, name: str) -> GroundStation:
 
 def ask(station: GroundStation, command: int, *params: float) -> int:
     """Send a command; return its result."""
-    station.take()
-    station.send(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))), wait_s=0.05)
+    station.ask(m.MAVLink_command_long_message(1, 1, command, 0, *params, *[0.0] * (7 - len(params))), wait_s=0.05)
     (ack,) = station.messages("COMMAND_ACK")
     assert ack.command == command
     result: int = ack.result

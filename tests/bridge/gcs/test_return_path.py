@@ -45,8 +45,7 @@ def keep_sending(station: GroundStation, message: Message = HELLO, interval_s: f
 def is_served(station: GroundStation) -> bool:
     """True if it gets telemetry, and an answer to a request."""
     station.frames.clear()
-    station.take()
-    station.send(m.MAVLink_param_request_read_message(1, 1, b"SYSID_THISMAV", -1), wait_s=1)
+    station.ask(m.MAVLink_param_request_read_message(1, 1, b"SYSID_THISMAV", -1), wait_s=1)
     kinds = {message.get_type() for message in station.messages()}
     return {"ATTITUDE", "PARAM_VALUE"} <= kinds
 
@@ -145,8 +144,7 @@ def test_connections_and_configured_addresses_do_not_need_to_prove_themselves() 
 def test_a_passed_through_autopilot_asks_in_its_own_name() -> None:
     autopilot = Autopilot(7)
     world = World(peer=autopilot, is_near=is_near)
-    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
-    world.run(2)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3, then_s=2)
     station = GroundStation(world, FAR)
     autopilot.received.clear()
     keep_sending(station)

@@ -66,8 +66,7 @@ def test_a_push_with_downloads_and_telemetry_fits_the_ring(baud: int) -> None:
     for number in range(40):
         world.after(number * 0.1, lambda: station.send(messages.MAVLink_mission_request_list_message(1, 1, 0)))
         world.after(number * 0.1, lambda: setattr(world.inside.missions, "held", None))
-    world.wait_until(lambda _: bool(outcome), 60)
-    world.run(30)
+    world.wait_until(lambda _: bool(outcome), 60, then_s=30)
     assert station.messages("MISSION_COUNT")
     assert world.bridge.vehicle.last(Orientation) is not None
     world.assert_line_was_clean()
@@ -105,8 +104,7 @@ def test_the_backlog_of_a_stalled_board_fits_the_ring(hang_s: float, baud: int, 
         world.faults.hang = True
         world.run(hang_s)
         world.faults.hang = False
-        world.wait_ready(20)
-        world.run(2)
+        world.wait_ready(20, then_s=2)
         counters = world.naze.counters
         assert counters.tx_overflows == counters.hazard_runs == 0
         assert counters.max_outstanding_reply_bytes <= 255

@@ -114,8 +114,7 @@ def assert_is_true(
 def craft(request: pytest.FixtureRequest) -> Craft:
     made = MAKERS[request.param]()
     made.world.wait_until(lambda w: w.kind is not None and w.kind.name == request.param, 20)
-    made.world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 20)
-    made.world.run(1)
+    made.world.wait_until(lambda w: w.bridge.vehicle.armed is False and not w.bridge.is_busy, 20, then_s=1)
     return made
 
 
@@ -204,8 +203,7 @@ def test_does_not_send_to_an_armed_craft(craft: Craft) -> None:
     craft.station.send(clear_message(), wait_s=3)
     assert any("isarm" in text for text in craft.station.texts())
     craft.faults.armed = False
-    craft.world.wait_until(lambda w: w.bridge.vehicle.armed is False, 30)
-    craft.world.run(3)
+    craft.world.wait_until(lambda w: w.bridge.vehicle.armed is False, 30, then_s=3)
     assert craft.holds(craft.plan(6))
 
 
@@ -227,8 +225,7 @@ def test_a_push_that_loses_the_line_ends_with_a_true_result(craft: Craft, moment
     craft.world.wait_until(lambda _: bool(outcome), 10)
     delivery, _ = outcome[0]
     craft.world.plug()
-    craft.world.wait_until(lambda w: w.is_found and w.bridge.vehicle.armed is False, 20)
-    craft.world.run(8)
+    craft.world.wait_until(lambda w: w.is_found and w.bridge.vehicle.armed is False, 20, then_s=8)
     assert_is_true(craft, delivery, craft.plan(6), craft.plan(60, 1))
 
 

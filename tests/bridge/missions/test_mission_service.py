@@ -30,8 +30,7 @@ def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_afte
     world = ready_world(SimOptions(boot_ms=boot_ms), flash=OLD_FLASH)
     station = GroundStation(world)
     upload = Upload(station, NEW)
-    world.wait_until(is_committing, 5)
-    world.run(cut_after_s)
+    world.wait_until(is_committing, 5, then_s=cut_after_s)
     upload.stop()
     station.radio.loss = 0.0
     if outcome is Outcome.VERIFIED:
@@ -46,8 +45,7 @@ def test_a_board_that_resets_during_commit_is_asked_later(boot_ms: int, cut_afte
     world.power_on()
     if outcome is Outcome.VERIFIED:
         world.plug()
-    world.wait_ready(boot_ms / 1000 + 15)
-    world.run(1)
+    world.wait_ready(boot_ms / 1000 + 15, then_s=1)
     assert world.stored == records_of(NEW if outcome is Outcome.VERIFIED else OLD)
     assert (ARRIVED if outcome is Outcome.VERIFIED else KEPT) in " ".join(station.texts())
     assert world.store.outcomes() == [outcome]
@@ -60,8 +58,7 @@ def test_a_mission_that_a_killed_daemon_left_pending_is_settled_at_the_start(
     world = World(speeds=(115200,), flash=OLD_FLASH)
     verdict = check_list(items, HarakiriRules())
     world.store.missions.append((ArrivedMission("udp", tuple(items), verdict), None))
-    world.wait_ready()
-    world.run(1)
+    world.wait_ready(then_s=1)
     assert world.store.outcomes() == [outcome]
 
 

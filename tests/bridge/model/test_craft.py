@@ -152,8 +152,7 @@ def test_an_unseen_landing_ends_the_flight() -> None:
     placed = home(station)
     world.at(world.now + 1.0, lambda: setattr(world.faults, "armed", False))
     world.restart_bridge(20.0)
-    world.wait_ready()
-    world.run(8)
+    world.wait_ready(then_s=8)
     assert not screens.glance().armed
     assert world.flight is None
     assert home(station)[:2] != placed[:2]

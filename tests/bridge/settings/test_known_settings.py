@@ -175,8 +175,7 @@ def test_a_station_that_connects_later_is_informed_until_arming() -> None:
     late.send(heartbeat, wait_s=1)
     assert warnings(late) == [told]
     world.naze.faults.armed = True
-    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5)
-    world.run(1)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 5, then_s=1)
     later = GroundStation(world, "later")
     later.send(heartbeat, wait_s=1)
     assert warnings(later) == []
@@ -210,8 +209,7 @@ def test_a_change_through_the_bridge_before_the_first_reading_is_not_reported(is
         world.unplug()
         world.run(1)
         world.plug()
-    world.wait_until(lambda world: world.inside.board_settings.known.state is not None, 60)
-    world.run(1)
+    world.wait_until(lambda world: world.inside.board_settings.known.state is not None, 60, then_s=1)
     assert world.events("settings.changed_on_board") == []
 
 
@@ -313,8 +311,7 @@ def test_unsaved_changes_that_a_restart_has_lost_no_longer_prevent_a_backup() ->
 def test_an_armed_board_is_backed_up_after_it_has_disarmed() -> None:
     faults = Faults(armed=True)
     world = World(SimOptions(), faults, speeds=(115200,))
-    world.wait_until(lambda world: world.is_found, 20)
-    world.run(20)
+    world.wait_until(lambda world: world.is_found, 20, then_s=20)
     assert world.backups == []
     faults.armed = False
     world.wait_until(lambda world: bool(world.backups), 30)

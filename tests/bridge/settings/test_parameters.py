@@ -45,8 +45,7 @@ def radius_world() -> tuple[World, GroundStation]:
 
 def parameter_list(world: World, station: GroundStation) -> list[Message]:
     """All PARAM_VALUEs after a request for the list."""
-    station.take()
-    station.send(m.MAVLink_param_request_list_message(1, 1))
+    station.ask(m.MAVLink_param_request_list_message(1, 1))
 
     def is_whole(_: World) -> bool:
         return any(each.param_index == each.param_count - 1 for each in station.messages("PARAM_VALUE"))
@@ -101,8 +100,7 @@ def test_qgroundcontrol_does_not_show_a_dialog_and_stays_on_the_map(board: str, 
     """It checks receiver, compass and accelerometer as soon as it has read the parameters."""
     faults = Faults(armed=is_armed, boxes=0)
     world = World(faults=faults, peer=None if board == "harakiri" else make_board(board, faults=faults))
-    world.wait_until(lambda w: w.is_found, 20)
-    world.run(3)
+    world.wait_until(lambda w: w.is_found, 20, then_s=3)
     station = GroundStation(world)
     screen = Screens(station).qgc
     parameter_list(world, station)
@@ -129,8 +127,7 @@ def test_qgroundcontrol_is_ready_before_a_flight_controller_is_found() -> None:
 def test_an_uncalibrated_inav_sensor_has_offset_0(blocker: int, name: str) -> None:
     faults = Faults(boxes=0)
     world = World(faults=faults, peer=make_board("inav", faults=faults))
-    world.wait_ready()
-    world.run(3)
+    world.wait_ready(then_s=3)
     station = GroundStation(world)
     received = parameter_list(world, station)
     assert {value[0]: value[1] for value in values(received)}[name] != 0
@@ -254,8 +251,7 @@ def settled_world() -> tuple[World, GroundStation]:
 
 
 def reply_to(world: World, station: GroundStation, name: bytes, value: float, seconds: float = 1.0) -> list[Message]:
-    station.take()
-    station.send(param_set(name, value), wait_s=seconds)
+    station.ask(param_set(name, value), wait_s=seconds)
     return [each for each in station.messages() if each.get_type() in ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")]
 
 
@@ -338,8 +334,7 @@ def test_a_save_after_a_refused_change_is_silent(name: bytes, value: float) -> N
     world, station = settled_world()
     operations = world.naze.flash_operations
     assert any(each.get_type() == "PARAM_ERROR" for each in reply_to(world, station, name, value))
-    station.take()
-    station.send(command_of_storage(1), wait_s=2)
+    station.ask(command_of_storage(1), wait_s=2)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_ACCEPTED]
     assert station.texts() == []
     assert world.naze.flash_operations == operations

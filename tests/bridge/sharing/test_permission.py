@@ -29,8 +29,7 @@ def ready(kind: str) -> World:
 
 def arm(world: World) -> None:
     world.naze.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
-    world.run(0.3)
+    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5, then_s=0.3)
 
 
 @pytest.mark.parametrize(

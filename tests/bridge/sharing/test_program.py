@@ -31,8 +31,7 @@ def flying_station(kind: str, baud: int = 115200) -> tuple[World, GroundStation]
     peer = None if kind == "harakiri" else make_board(kind, MspOptions(baud=baud))
     world = World(SimOptions(baud=baud), speeds=(baud,), peer=peer)
     station = GroundStation(world).stay_connected()
-    world.wait_ready(60)
-    world.run(3)
+    world.wait_ready(60, then_s=3)
     return world, station
 
 

@@ -197,8 +197,7 @@ def test_items_out_of_order_are_kept_and_missing_items_requested() -> None:
     items = waypoints(8)
     world, station = begun(items, 0)
     for seq, wanted in [(0, 1), (2, 1), (3, 1), (7, 1), (1, 4), (5, 4), (6, 4)]:
-        station.take()
-        station.send(item_message(seq, items[seq]), wait_s=0.001)
+        station.ask(item_message(seq, items[seq]), wait_s=0.001)
         assert requested(station) == [wanted]
     station.send(item_message(4, items[4]), wait_s=1)
     assert acks(station) == [A.ACCEPTED]
@@ -210,8 +209,7 @@ def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
     world, station = begun(items, 5)
     for seq in (1, 4, 4, 2):
         world.run(0.12)
-        station.take()
-        station.send(item_message(seq, items[seq]), wait_s=0.001)
+        station.ask(item_message(seq, items[seq]), wait_s=0.001)
         assert requested(station) == [5]
     finish(world, station, items, 5)
 
@@ -233,7 +231,6 @@ def test_an_item_beyond_the_list_is_an_invalid_sequence_and_the_transfer_continu
     items = waypoints(8)
     world, station = begun(items, 3)
     for seq in (8, 9, 65535):
-        station.take()
-        station.send(item_message(seq, items[0]), wait_s=0.001)
+        station.ask(item_message(seq, items[0]), wait_s=0.001)
         assert acks(station) == [A.INVALID_SEQUENCE]
     finish(world, station, items, 3)

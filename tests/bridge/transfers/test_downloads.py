@@ -42,8 +42,7 @@ def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tupl
 
 def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
     """Send a message; return the mission messages addressed to the sender in reply."""
-    station.take()
-    station.send(message, wait_s=seconds)
+    station.ask(message, wait_s=seconds)
     return [message for message in station.messages() if station.is_target_of(message)]
 
 
@@ -252,8 +251,7 @@ def disarmed(board: str | TelemetryProtocol) -> tuple[World, list[MissionItem]]:
     else:
         faults = Faults(boxes=0)
         world = World(peer=make_board(board, faults=faults), faults=faults)
-    world.wait_ready()
-    world.run(6)
+    world.wait_ready(then_s=6)
     if not isinstance(board, TelemetryProtocol):
         assert Upload(GroundStation(world, "planner"), items).run() is A.ACCEPTED
     return world, items
@@ -261,8 +259,7 @@ def disarmed(board: str | TelemetryProtocol) -> tuple[World, list[MissionItem]]:
 
 def arm(world: World) -> None:
     world.faults.armed = True
-    world.wait_until(lambda w: bool(w.bridge.vehicle.armed) and w.is_found, 20)
-    world.run(3)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed) and w.is_found, 20, then_s=3)
 
 
 def legs(items: list[MissionItem]) -> list[tuple[object, ...]]:
@@ -283,8 +280,7 @@ def test_the_mission_is_readable_while_armed(board: str | TelemetryProtocol) -> 
 def test_a_mission_that_was_not_read_before_arming_is_read_or_missing(board: str | TelemetryProtocol) -> None:
     """The bridge was started in flight: only boards whose list can be read armed have one."""
     world = armed_before(board)
-    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 15)
-    world.run(5)
+    world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 15, then_s=5)
     station = GroundStation(world)
     items = Download(station).run(5)
     if board not in (TelemetryProtocol.MSP, TelemetryProtocol.FRSKY_9600, "inav"):  # these answer MSP, too

@@ -23,8 +23,7 @@ def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
     outcome = world.push(waypoints(146))
     station.send(count_message(5), wait_s=0.05)
     assert requested(station) == []
-    world.wait_until(lambda _: bool(outcome), 2)
-    world.run(0.1)
+    world.wait_until(lambda _: bool(outcome), 2, then_s=0.1)
     assert requested(station) == [0]
     assert any(text.startswith("test: ") for text in station.texts())
     for seq, item in enumerate(waypoints(5)):

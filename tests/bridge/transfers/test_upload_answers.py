@@ -25,8 +25,7 @@ def test_a_refusal_is_remembered_for_ten_seconds() -> None:
     world, station = holding()
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     world.run(10.5)
-    station.take()
-    station.send(partial_list_message(), wait_s=1)
+    station.ask(partial_list_message(), wait_s=1)
     assert acks(station) == [A.UNSUPPORTED]
     assert "A mission can only be written as a whole" in station.texts()
 
@@ -39,16 +38,13 @@ def test_a_repeated_last_item_is_answered_by_the_final_ack() -> None:
         assert state(world) is Delivering
         assert acks(station) == []
         assert requested(station) == []
-    world.wait_until(lambda _: bool(acks(station)), 3)
-    world.run(1)
+    world.wait_until(lambda _: bool(acks(station)), 3, then_s=1)
     for _ in range(4):
-        station.take()
-        station.send(item_message(145, items[145]), wait_s=0.45)
+        station.ask(item_message(145, items[145]), wait_s=0.45)
         assert acks(station) == [A.ACCEPTED]
         assert state(world) is None
     # Only the last item.
-    station.take()
-    station.send(item_message(20, items[20]), wait_s=0.45)
+    station.ask(item_message(20, items[20]), wait_s=0.45)
     assert acks(station) == []
     assert world.naze.counters.flash_writes == 2
 

@@ -59,8 +59,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         partial_list_message(mission_type),
         *([clear_message(mission_type)] if mission_type != 255 else []),
     ):
-        station.take()
-        station.send(message, wait_s=0.3)
+        station.ask(message, wait_s=0.3)
         answers = [(ack.type, ack.mission_type) for ack in station.messages("MISSION_ACK")]
         assert answers == [(A.UNSUPPORTED, mission_type)]
         assert requested(station) == []
@@ -199,8 +198,7 @@ def test_unfinished_uploads_do_not_delay_others() -> None:
 def test_only_some_cancelled_lists_are_stored() -> None:
     world, station = holding()
     for _ in range(60):
-        station.take()
-        station.send(count_message(3))
+        station.ask(count_message(3))
         world.wait_until(lambda _: bool(requested(station)), 2)
         station.send(item_message(0, OLD[0]))
         station.send(ack_message(A.ERROR), wait_s=0.3)
@@ -366,8 +364,7 @@ def test_an_upload_without_a_link_is_denied() -> None:
     world.unplug()
     refused(world, station, 5, A.DENIED, "No link")
     for message in (count_message(0), clear_message()):
-        station.take()
-        station.send(message, wait_s=0.1)
+        station.ask(message, wait_s=0.1)
         assert acks(station) == [A.DENIED]
 
 
@@ -454,8 +451,7 @@ def test_a_new_count_clears_the_previous_refusal() -> None:
     world, station = holding()
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
-    station.take()
-    station.send(item_message(1, OLD[1]), wait_s=0.1)
+    station.ask(item_message(1, OLD[1]), wait_s=0.1)
     assert acks(station) == []
 
 
@@ -543,8 +539,7 @@ def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> Non
     world.run(0.1)
     station.take()
     world.run(late_s)
-    station.take()
-    station.send(count_message(0), wait_s=1)
+    station.ask(count_message(0), wait_s=1)
     assert acks(station) == [A.INVALID]
     assert world.stored == OLD_RECORDS
 

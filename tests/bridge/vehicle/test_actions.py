@@ -118,8 +118,7 @@ def test_does_not_act_unless_the_arming_state_can_be_read(tele_prot: TelemetryPr
     world.faults.armed = True
     for seconds in (0.02, 0.3, 4.0):
         world.run(seconds)
-        station.take()
-        station.send(long(*COMPASS[:2]), wait_s=3)
+        station.ask(long(*COMPASS[:2]), wait_s=3)
         assert len(results(station)) == 1
         assert results(station)[0] in (DENIED, FAILED)
     assert done(world) == []

@@ -117,8 +117,7 @@ def test_messages_without_an_acknowledgement_are_answered_once(message: Message,
     for _ in range(300):
         station.send(message, wait_s=0.02)
     assert station.texts() == [text]
-    station.take()
-    station.send(list_message(), wait_s=1)
+    station.ask(list_message(), wait_s=1)
     assert station.messages("MISSION_COUNT")
 
 
@@ -128,8 +127,7 @@ def test_a_plan_with_only_a_fence_clears_the_mission_with_two_notes() -> None:
     items = waypoints(5)
     assert Upload(station, items).run() is MissionResult.ACCEPTED
     world.run(12)
-    station.take()
-    station.send(count_message(0), wait_s=3)
+    station.ask(count_message(0), wait_s=3)
     assert {ack.type for ack in station.messages("MISSION_ACK")} == {MissionResult.ACCEPTED}
     said = station.texts()
     assert said[0] == "Plan without waypoints: fences are not stored here"

@@ -96,8 +96,7 @@ def signing_station(world: World, name: str = "gcs", *, at: int = ticks(NOON), s
 def passing(links: dict[str, LinkAccess], sysid: int = 1, *, everything: bool = False) -> tuple[World, Autopilot]:
     autopilot = Autopilot(sysid=sysid)
     world = World(peer=autopilot, links=links, passes_everything=everything)
-    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3)
-    world.run(1.5)
+    world.wait_until(lambda w: w.kind is other.OTHER_MAVLINK, 3, then_s=1.5)
     autopilot.received.clear()
     return world, autopilot
 

@@ -102,8 +102,7 @@ def test_a_requested_mission_current_has_the_askers_numbers() -> None:
     sender = GroundStation(world)
     assert Upload(sender, WITH_TAKEOFF).run() is MissionResult.ACCEPTED
     fly(world, board, 2)
-    sender.take()
-    sender.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_REQUEST_MESSAGE, 0, 42, *[0.0] * 6))
+    sender.ask(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_REQUEST_MESSAGE, 0, 42, *[0.0] * 6))
     world.run_until(lambda _: bool(sender.messages("COMMAND_ACK")), 1)
     assert current(sender) == (3, 4)
 

@@ -45,8 +45,7 @@ def blocked() -> World:
     faults = Faults(boxes=0, arming_blockers=RC_LINK)
     world = World(speeds=(115200,), peer=make_board("inav", MspOptions(), faults))
     world.faults = faults
-    world.wait_ready()
-    world.run(3)
+    world.wait_ready(then_s=3)
     return world
 
 

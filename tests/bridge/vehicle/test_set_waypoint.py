@@ -279,8 +279,7 @@ def test_an_unknown_mission_is_not_sent() -> None:
     inav = FakeInav(drop=lambda frame: "request" if frame.command == Nav.WP else "")
     inav.records, inav.is_valid, inav.armed = [FAKE], True, True
     world = World(speeds=(115200,), peer=inav, links=LINKS)
-    world.wait_until(lambda world: world.is_found, 10)
-    world.run(1)
+    world.wait_until(lambda world: world.is_found, 10, then_s=1)
     station = GroundStation(world)
     station.send(long(1), wait_s=0.5)
     assert (results(station), station.texts()) == ([DENIED], ["Set WP: read the mission from the board first"])

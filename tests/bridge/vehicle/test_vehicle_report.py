@@ -37,8 +37,7 @@ def test_everything_is_unknown_before_a_flight_controller_is_found() -> None:
 
 def test_after_a_lost_link_arming_mode_and_place_are_kept_with_their_age() -> None:
     world = World()
-    world.wait_ready()
-    world.run(3.0)
+    world.wait_ready(then_s=3.0)
     bridge = world.bridge
     known = bridge.report(world.now)
     assert None not in (known.position.lat_deg, known.attitude.roll_deg, known.status.mode)
@@ -88,12 +87,10 @@ def test_a_values_age_grows_while_the_line_is_silent() -> None:
 
 def test_groups_continue_when_an_armed_harakiri_switches_to_mavlink() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
-    world.wait_ready()
-    world.run(2.0)
+    world.wait_ready(then_s=2.0)
     before = world.bridge.report(world.now)
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10)
-    world.run(3.0)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 10, then_s=3.0)
     now = world.bridge.report(world.now)
     assert now.status.armed
     assert now.position.lat_deg == pytest.approx(before.position.lat_deg, abs=0.01)

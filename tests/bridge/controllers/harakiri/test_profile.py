@@ -44,6 +44,5 @@ def test_the_arm_box_is_found_by_the_name() -> None:
         flags = 1 << boxes.split(b";").index(b"ARM")
         status = bytes(6) + flags.to_bytes(4, "little") + b"\0"
         world = World(peer=MspFake({100: ident(241, 0), 2: b"MWII", 116: boxes, 101: status}))
-        world.wait_until(lambda w: w.is_found, 3)
-        world.run(1)
+        world.wait_until(lambda w: w.is_found, 3, then_s=1)
         assert world.bridge.vehicle.armed is True

@@ -50,11 +50,9 @@ def test_an_armed_harakiri_in_mavlink_mode_keeps_the_table() -> None:
     client = SettingsClient(world)
     table = client.wait_read()
     faults.armed = True
-    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20)
-    world.run(5)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20, then_s=5)
     assert client.current() is table
     assert cause_of(client.change("p_roll", 40)) is Cause.ARMED
     faults.armed = False
-    world.wait_until(lambda world: world.bridge.vehicle.armed is False, 20)
-    world.run(10)
+    world.wait_until(lambda world: world.bridge.vehicle.armed is False, 20, then_s=10)
     assert value_of(client.change("p_roll", 40)) == 40

@@ -43,8 +43,7 @@ class Bench:
         self.station = GroundStation(self.world)
         self.station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), wait_s=0.5)
         self.world.plug()
-        self.world.wait_ready(10)
-        self.world.run(5)
+        self.world.wait_ready(10, then_s=5)
 
     def stored(self) -> list[list[bytes]]:
         """The missions in the EEPROM, without record numbers."""
@@ -143,8 +142,7 @@ def restart(bench: Bench) -> None:
     bench.board.power_off(bench.world.now)
     bench.world.run(3)
     bench.board.power_on(bench.world.now)
-    bench.world.wait_until(lambda w: w.is_found, 15)
-    bench.world.run(3)
+    bench.world.wait_until(lambda w: w.is_found, 15, then_s=3)
 
 
 def test_after_a_restart_the_saved_mission_is_loaded_and_reported() -> None:

@@ -98,8 +98,7 @@ def test_it_is_recognised_in_mid_conversation_and_found_again_after_exit(kind: s
     world = World(peer=BOARDS[kind]())
     station = GroundStation(world)
     world.bridge.add_default_peer(station.peer, until_answered=False)
-    world.wait_ready()
-    world.run(5)
+    world.wait_ready(then_s=5)
     open_command_line(world)
     began = world.now
     world.wait_until(is_in_cli, 2)
@@ -114,8 +113,7 @@ def test_it_is_recognised_in_mid_conversation_and_found_again_after_exit(kind: s
         assert b"Rebooting" not in echo
         echo = type_exit(world)
     assert b"Rebooting" in echo
-    world.wait_until(lambda w: w.is_found, 20)
-    world.run(5)
+    world.wait_until(lambda w: w.is_found, 20, then_s=5)
     assert any("back after" in text for text in station.texts())
     assert Upload(station, waypoints(5)[kind == "inav" :]).run() is MissionResult.ACCEPTED
 
@@ -123,14 +121,12 @@ def test_it_is_recognised_in_mid_conversation_and_found_again_after_exit(kind: s
 @pytest.mark.parametrize("kind", BOARDS)
 def test_it_is_found_again_after_unplugging(kind: str) -> None:
     world = left_in_cli(BOARDS[kind]())
-    world.wait_until(is_in_cli, 2)
-    world.run(10)
+    world.wait_until(is_in_cli, 2, then_s=10)
     world.power_off()
     world.wait_until(lambda w: isinstance(w.inside.session.state, Searching), 10)
     assert world.bridge.fc_trouble == ""
     world.power_on()
-    world.wait_until(lambda w: w.is_found, 20)
-    world.run(1)
+    world.wait_until(lambda w: w.is_found, 20, then_s=1)
 
 
 @pytest.mark.parametrize("kind", BOARDS)
@@ -146,8 +142,7 @@ def test_a_board_in_the_cli_is_probed_every_three_seconds(kind: str) -> None:
 
 def test_is_silent_while_a_person_types() -> None:
     world = left_in_cli(BOARDS["testcode3"]())
-    world.wait_until(is_in_cli, 2)
-    world.run(1)
+    world.wait_until(is_in_cli, 2, then_s=1)
     began = world.now
     for character in b"set looptime=3500":
         world.naze.receive(bytes((character,)), world.now)

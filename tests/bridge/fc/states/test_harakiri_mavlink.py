@@ -80,8 +80,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent() -> None:
     for _ in range(2):
         station.received.clear()
         world.faults.armed = True
-        world.wait_until(lambda w: w.inside.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 5)
-        world.run(20)
+        world.wait_until(lambda w: w.inside.session.state.speed == 9600 and w.kind is harakiri.PATCHED, 5, then_s=20)
         assert world.kind is harakiri.PATCHED
         assert station.messages("HEARTBEAT")[-1].base_mode & 128
         status = station.messages("SYS_STATUS")[-1]
@@ -89,8 +88,7 @@ def test_ground_stations_see_one_vehicle_while_frsky_is_sent() -> None:
         assert world.now - next(at for at, message in reversed(station.received) if message is status) <= 1.1
         assert Upload(station, waypoints(13)).run() is MissionResult.DENIED
         world.faults.armed = False
-        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.inside.session.state.speed == 115200, 5)
-        world.run(3)
+        world.wait_until(lambda w: w.kind is harakiri.PATCHED and w.inside.session.state.speed == 115200, 5, then_s=3)
         assert max(heartbeat_gaps(station)) <= 1.5
         assert not [text for text in station.texts() if "lost" in text]
     world.assert_line_was_clean()
@@ -100,19 +98,16 @@ def test_a_board_met_over_msp_keeps_the_family_regardless_of_the_ids() -> None:
     """A Harakiri with changed ids: to pass frames on to it could reset it."""
     world = ready_world()
     world.naze = MavlinkOnly(1)
-    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8)
-    world.run(30)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK, 8, then_s=30)
     assert world.kind is harakiri.MAVLINK
 
 
 def test_a_harakiri_that_disarms_is_asked_for_msp_at_once() -> None:
     world = ready_world(SimOptions(tele_prot=TelemetryProtocol.MAVLINK))
     world.faults.armed = True
-    world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.vehicle.armed is True, 8)
-    world.run(3.3)
+    world.wait_until(lambda w: w.kind is harakiri.MAVLINK and w.bridge.vehicle.armed is True, 8, then_s=3.3)
     world.faults.armed = False
-    world.wait_until(lambda w: w.bridge.vehicle.armed is False, 5)
-    world.run(0.01)
+    world.wait_until(lambda w: w.bridge.vehicle.armed is False, 5, then_s=0.01)
     assert PROBE in [data for at, _, data in world.written if at >= world.now - 0.02]
 
 

@@ -19,8 +19,7 @@ def test_a_board_is_found_within_3_s_of_booting_after_any_power_cycle(baud: int,
     for _ in range(2):
         boot_s = draw.choice((0.5, 1.0, 2.0, 3.5))
         world = World(SimOptions(baud=baud, boot_ms=boot_s * 1000), Faults(extension=extension))
-        world.wait_until(verdict, 10)
-        world.run(draw.random() * draw.choice((0.2, 4)))
+        world.wait_until(verdict, 10, then_s=draw.random() * draw.choice((0.2, 4)))
         world.power_off()
         world.run(draw.choice((0.001, draw.random() * 3, draw.random() * 12)))
         world.power_on()

@@ -202,8 +202,7 @@ def test_after_an_autopilot_is_unplugged_the_bridge_represents_its_own_vehicle()
     world.run(5)
     assert any("Flight controller lost" in text for text in station.texts())
     assert len(station.messages("HEARTBEAT")) >= 4
-    station.take()
-    station.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    station.ask(mavlink.MAVLink_param_request_list_message(1, 1))
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 3), wait_s=0.5)
     assert station.messages("PARAM_VALUE")
     assert [ack.type for ack in station.messages("MISSION_ACK")] == [mavlink.MAV_MISSION_DENIED]
