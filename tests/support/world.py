@@ -218,6 +218,11 @@ class World:
         self._start_bridge(left)
         self.plug()
 
+    def arm(self, within_s: float = 20.0, *, then_s: float = 0.0) -> None:
+        """Arm the board, and wait until the bridge knows."""
+        self.naze.faults.armed = True
+        self.wait_until(lambda _: self.bridge.vehicle.armed is True, within_s, then_s=then_s)
+
     def power_off(self) -> None:
         self.naze.power_off(self.now)
 
@@ -322,6 +327,12 @@ class World:
     def requests(self, since: float = 0.0) -> list[MspFrame]:
         """The MSP frames that were written to the flight controller since then, as far as `written` has them."""
         return [frame for at, _, data in self.written if at >= since for frame in MspParser().feed(data)]
+
+    def requests_during(self, seconds: float) -> list[MspFrame]:
+        """Let time pass; the MSP frames that are written to the flight controller meanwhile."""
+        began = self.now
+        self.run(seconds)
+        return self.requests(began)
 
     def take_published(self) -> set[Group]:
         """The watched groups with new values since the last call."""

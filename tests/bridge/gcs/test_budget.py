@@ -70,8 +70,7 @@ def test_one_stranger_leaves_half_of_the_flash_writes_to_others() -> None:
 def test_a_flood_of_counts_is_not_logged() -> None:
     world = ready_world()
     station = GroundStation(world)
-    world.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
+    world.arm(5)
     for number in range(2000):
         world.after(number / 500, lambda: station.send(m.MAVLink_mission_count_message(1, 1, 999)))
     world.run(5)
@@ -86,8 +85,7 @@ def test_strangers_requests_do_not_reach_an_armed_board() -> None:
     world = ready_world()
     stranger = GroundStation(world)
     stranger.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    world.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5)
+    world.arm(5)
     asked = (
         m.MAVLink_mission_clear_all_message(1, 1),
         m.MAVLink_mission_count_message(1, 1, 9),
@@ -97,9 +95,7 @@ def test_strangers_requests_do_not_reach_an_armed_board() -> None:
     )
 
     def requests(seconds: float) -> Counter[int]:
-        world.written.clear()
-        world.run(seconds)
-        return Counter(frame.command for frame in world.requests())
+        return Counter(frame.command for frame in world.requests_during(seconds))
 
     def ask_all() -> None:
         for message in asked:

@@ -54,9 +54,7 @@ def rates_hz(station: GroundStation, seconds: float = 10) -> dict[str, float]:
 
 
 def polls_hz(world: World, command: Msp, seconds: float = 6) -> float:
-    world.written.clear()
-    world.run(seconds)
-    return sum(frame.command == command for frame in world.requests()) / seconds
+    return sum(frame.command == command for frame in world.requests_during(seconds)) / seconds
 
 
 def test_mission_planner_gets_the_rates_it_requests(world: World) -> None:

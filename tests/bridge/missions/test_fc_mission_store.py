@@ -63,8 +63,7 @@ class Craft:
         return len(read) == len(items) and all(map(is_alike, read[1:], items[1:]))
 
     def arm(self) -> None:
-        self.faults.armed = True
-        self.world.wait_until(lambda w: bool(w.bridge.vehicle.armed), 30)
+        self.world.arm(30)
 
 
 def is_alike(one: MissionItem, other: MissionItem) -> bool:

@@ -55,8 +55,7 @@ def test_settings_cannot_be_changed_or_saved_while_armed(name: str) -> None:
     faults = Faults()
     world, client = ready(board, faults)
     table = client.wait_read()
-    faults.armed = True
-    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20)
+    world.arm(20)
     before = world.now
     assert cause_of(client.change(board.name, board.after)) is Cause.ARMED
     assert cause_of(client.save()) is Cause.ARMED

@@ -139,8 +139,7 @@ def test_pulling_the_cable_during_the_save_leaves_the_outcome_open() -> None:
 def test_an_armed_board_is_not_restored() -> None:
     faults = Faults()
     world, _ = ready(BOARDS[NAZE], faults)
-    faults.armed = True
-    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20)
+    world.arm(20)
     before = writes(world)
     result = restored(world, {"p_roll": 44.0})
     assert isinstance(result, SettingRefusal)

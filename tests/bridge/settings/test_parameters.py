@@ -360,8 +360,7 @@ def test_a_station_that_uses_other_letters_is_answered_with_them() -> None:
 def test_preflight_storage_in_flight_is_denied_while_something_is_unsaved() -> None:
     world, station = settled_world()
     reply_to(world, station, b"P_ROLL", 44.0)
-    world.faults.armed = True
-    world.run(1)
+    world.arm(then_s=1)
     station.send(command_of_storage(1), wait_s=1)
     assert [ack.result for ack in station.messages("COMMAND_ACK")] == [m.MAV_RESULT_DENIED]
 
@@ -442,8 +441,7 @@ def test_every_refused_change_is_an_error_on_every_board(kind: str, reason: str)
     name, value, error = _REFUSALS[reason]
     match reason:
         case "armed":
-            world.faults.armed = True
-            world.run(2)
+            world.arm(then_s=2)
         case "lost":
             world.power_off()
             world.run(6)

@@ -28,8 +28,7 @@ def ready(kind: str) -> World:
 
 
 def arm(world: World) -> None:
-    world.naze.faults.armed = True
-    world.wait_until(lambda world: bool(world.bridge.vehicle.armed), 5, then_s=0.3)
+    world.arm(5, then_s=0.3)
 
 
 @pytest.mark.parametrize(
@@ -53,8 +52,7 @@ def test_a_display_stays_live_in_flight(kind: str, loop: tuple[int, ...], is_con
         program.ask_in_turn(0.005, loop)
     program.replies.clear()
     world.run(1)
-    world.written.clear()
-    world.run(10)
+    sent = {frame.command for frame in world.requests_during(10)}
     assert program.closed_at is None
     counts = dict.fromkeys(loop, 0)
     for _, frame in program.replies:
@@ -62,7 +60,6 @@ def test_a_display_stays_live_in_flight(kind: str, loop: tuple[int, ...], is_con
     # Once a second, and what the bridge had no poll for until now, too.
     assert min(counts.values()) >= 10
     # Polls, and the watch of the mission.
-    sent = {frame.command for frame in world.requests()}
     assert sent <= {*world.inside.session.polls.commands, WP_GETINFO}
 
 

@@ -157,8 +157,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
 def test_item_0_alone_has_the_altitude_of_home_while_armed() -> None:
     """Mission Planner requests it on arming, and takes its ground level from it."""
     world, station = holding()
-    world.faults.armed = True
-    world.run(1)
+    world.arm(then_s=1)
     home = world.bridge.vehicle.home
     assert home is not None
     for as_int in (True, False):
@@ -292,8 +291,7 @@ def test_another_boards_mission_is_not_served() -> None:
     """The port was opened again, and the board on it speaks no MSP."""
     world, _ = disarmed(TelemetryProtocol.MAVLINK)
     world.unplug()
-    world.faults.armed = True
-    world.run(3)
+    world.arm(then_s=3)
     world.plug()
     arm(world)
     station = GroundStation(world)

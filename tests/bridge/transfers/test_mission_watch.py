@@ -162,9 +162,8 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
     assert Upload(station, plan(9), tries=60).run(60) is ACCEPTED
     board.faults.armed, board.faults.boxes = True, 1 << 10
     world.run(2)
-    before = world.now
-    world.run(5)
-    assert not [frame for frame in world.requests(before) if frame.command == Nav.WP and frame.payload != b"\0"]
+    asked = world.requests_during(5)
+    assert not [frame for frame in asked if frame.command == Nav.WP and frame.payload != b"\0"]
     board.faults.armed = False
     world.run(5)
     assert not [text for text in station.texts() if "changed" in text]
@@ -172,8 +171,6 @@ def test_a_multiwii_is_not_read_in_flight() -> None:
 
 def test_polling_an_empty_multiwii_does_not_report_changes() -> None:
     _, world, station = board_with("multiwii")
-    before = world.now
-    world.run(5)
+    asked = [frame.payload for frame in world.requests_during(5) if frame.command == Nav.WP]
     assert not [text for text in station.texts() if "changed" in text]
-    asked = [frame.payload for frame in world.requests(before) if frame.command == Nav.WP]
     assert [payload for payload in asked if payload[0] > 1] == []

@@ -79,8 +79,7 @@ def test_another_mission_type_does_not_disturb_a_transfer() -> None:
 
 def test_an_upload_while_armed_is_denied() -> None:
     world, station = holding()
-    world.faults.armed = True
-    world.run(1)
+    world.arm(then_s=1)
     refused(world, station, 5, A.DENIED, "disarm")
     world.faults.armed = False
     world.run(1)

@@ -132,8 +132,7 @@ def test_a_flying_craft_that_is_lost_does_not_fly_on_in_qgroundcontrol() -> None
     station, planner = GroundStation(world), GroundStation(world, "planner")
     station.heartbeat = QGC_HEARTBEAT
     qgc, mission_planner = Screens(station), Screens(planner)
-    world.faults.armed = True
-    world.run(5)
+    world.arm(then_s=5)
     assert qgc.glance().qgc == "Flying"
     world.faults.hang = True
     world.run(5)

@@ -66,8 +66,7 @@ class Flight:
             assert Upload(self.station, list(items)).run() is MissionResult.ACCEPTED
 
     def begin(self) -> "Flight":
-        self.board.faults.armed = True
-        self.world.run(2)
+        self.world.arm(then_s=2)
         self.board.faults.boxes = NAV_WP
         self.world.run(2)
         self.station.received.clear()
@@ -174,8 +173,7 @@ def test_the_mission_is_not_reset() -> None:
 def test_on_the_ground_and_outside_of_the_waypoint_mode_it_is_refused() -> None:
     flight = Flight()
     flight.ask(long(3))
-    flight.board.faults.armed = True
-    flight.world.run(2)
+    flight.world.arm(then_s=2)
     flight.ask(long(3))
     assert results(flight.station) == [DENIED, DENIED]
     assert flight.station.texts().count("Set WP: only in flight, in NAV WP mode") == 2

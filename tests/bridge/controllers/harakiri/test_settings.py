@@ -49,8 +49,7 @@ def test_an_armed_harakiri_in_mavlink_mode_keeps_the_table() -> None:
     world = World(SimOptions(tele_prot=TelemetryProtocol.MAVLINK), faults, speeds=(115200,))
     client = SettingsClient(world)
     table = client.wait_read()
-    faults.armed = True
-    world.wait_until(lambda world: world.bridge.vehicle.armed is True, 20, then_s=5)
+    world.arm(20, then_s=5)
     assert client.current() is table
     assert cause_of(client.change("p_roll", 40)) is Cause.ARMED
     faults.armed = False

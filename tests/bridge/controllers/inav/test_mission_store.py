@@ -173,8 +173,7 @@ def test_the_board_arms_with_any_list_that_the_rules_accept(items: list[MissionI
         return
     board, world, station = board_with()
     assert Upload(station, sent).run() is ACCEPTED
-    board.faults.armed = True
-    world.run(2)
+    world.arm(then_s=2)
     assert board.armed
     assert board.counters.crashes == 0
 

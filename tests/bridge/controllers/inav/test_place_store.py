@@ -131,10 +131,9 @@ def test_a_fence_button_is_refused_according_to_the_board(version: str, text: st
 
 
 def test_an_armed_craft_is_read_but_not_changed() -> None:
-    board, world, station = board_with()
+    _, world, station = board_with()
     assert Upload(station, RALLY_ITEMS, mission_type=RALLY).run() is ACCEPTED
-    board.faults.armed = True
-    world.run(3)
+    world.arm(then_s=3)
     assert Upload(station, RALLY_ITEMS[:1], mission_type=RALLY).run() is MissionResult.DENIED
     assert read(station, RALLY) == numbered(RALLY_ITEMS)
 

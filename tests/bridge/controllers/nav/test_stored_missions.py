@@ -57,8 +57,7 @@ class Bench:
 
     def flown(self) -> list[bytes]:
         """The list that the board would fly if armed now."""
-        self.faults.armed = True
-        self.world.run(3)
+        self.world.arm(then_s=3)
         assert self.board.armed
         held = self.world.bridge.missions.held
         self.faults.armed = False
