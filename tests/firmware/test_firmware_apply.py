@@ -24,22 +24,12 @@ from hypothesis import strategies as st
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PATCHES = sorted((FIRMWARE / "patches").glob("*.patch"))
-CORE = (
-    "naze_slots.h",
-    "naze_slots.c",
-    "naze_mission.h",
-    "naze_mission.c",
-    "harakiri_mission.h",
-    "harakiri_mission.c",
-    "harakiri_guard.h",
-    "harakiri_guard.c",
-    "harakiri_config.h",
-    "harakiri_config.c",
-    "harakiri_flash.h",
-    "harakiri_flash.c",
-    "harakiri_settings.h",
-    "harakiri_settings.c",
+MODULES = (
+    "naze_slots",
+    "naze_mission",
+    *(f"harakiri_{name}" for name in ["mission", "guard", "config", "flash", "settings"]),
 )
+CORE = tuple(f"{module}.{suffix}" for module in MODULES for suffix in "hc")
 PATCH = """\
 The mission extension for a tree of our own, commit 0123abc, for tests.
 base {makefile} Makefile

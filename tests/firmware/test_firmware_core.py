@@ -87,15 +87,9 @@ def test_fuzzer_finds_no_fault_in_a_few_seconds() -> None:
 @pytest.mark.parametrize(("pages", "compiles"), [(128, True), (64, False)])
 def test_slots_must_match_the_linker_script(pages: int, compiles: bool) -> None:
     """A build for 64 KB of flash would put the slots into the program's area of stm32_flash.ld."""
-    flags = [
-        "-std=c99",
-        "-fsyntax-only",
-        f"-DFLASH_PAGE_COUNT={pages}",
-        f"-I{FIRMWARE}",
-        f"-I{FIRMWARE}/tests/harakiri",
-    ]
-    command = ["gcc", *flags, str(FIRMWARE / "harakiri_flash.c")]
-    run = subprocess.run(command, capture_output=True, text=True)
+    folders = [f"-I{FIRMWARE}", f"-I{FIRMWARE}/tests/harakiri"]
+    command = ["gcc", "-std=c99", "-fsyntax-only", f"-DFLASH_PAGE_COUNT={pages}", *folders, "harakiri_flash.c"]
+    run = subprocess.run(command, cwd=FIRMWARE, capture_output=True, text=True)
     assert (run.returncode == 0) is compiles
     assert ("slots_lie_where_stm32_flash_ld_says" in run.stderr) is not compiles
 

@@ -26,25 +26,10 @@ from protocols.msp.frame import Direction, MspFrame
 
 HARAKIRI_BOXES = ("ANGLE", "HORIZON", "BARO", "MAG", "CAMSTAB", "ARM", "GPS HOME", "GPS HOLD", "GPS AUTO")
 HARAKIRI = FlightController(harakiri.UNPATCHED, "Harakiri", Airframe.QUADROTOR, HARAKIRI_BOXES)
-INAV = FlightController(
-    inav.PROFILE,
-    "INAV",
-    None,
-    (
-        "ARM",
-        "ANGLE",
-        "HORIZON",
-        "NAV ALTHOLD",
-        "NAV POSHOLD",
-        "NAV RTH",
-        "NAV WP",
-        "MANUAL",
-        "NAV LAUNCH",
-        "NAV COURSE HOLD",
-        "NAV CRUISE",
-        "ANGLE HOLD",
-    ),
+INAV_BOXES = (
+    "ARM;ANGLE;HORIZON;NAV ALTHOLD;NAV POSHOLD;NAV RTH;NAV WP;MANUAL;NAV LAUNCH;NAV COURSE HOLD;NAV CRUISE;ANGLE HOLD"
 )
+INAV = FlightController(inav.PROFILE, "INAV", None, tuple(INAV_BOXES.split(";")))
 BETAFLIGHT = FlightController(other.OTHER_MSP, "BTFL", None, ("ARM", "ANGLE", "HORIZON", "ALT HOLD", "GPS RESCUE"))
 ALL_SENSORS = 0b1111
 U16, U8 = 65535, 255
