@@ -69,12 +69,13 @@ class Workshop:
 
     def __init__(self, path: Path) -> None:
         self.firmware, self.tree = path / "firmware", path / "Tree"
+        self.main = self.tree / "src" / "main.c"
         (self.firmware / "patches").mkdir(parents=True)
         (self.tree / "src").mkdir(parents=True)
         for name in (*CORE, "apply"):
             shutil.copy(FIRMWARE / name, self.firmware)
         (self.tree / "Makefile").write_bytes(MAKEFILE)
-        (self.tree / "src" / "main.c").write_bytes(MAIN)
+        self.main.write_bytes(MAIN)
         (self.tree / "src" / "mw.h").write_bytes(MW)
         (self.tree / "src" / "util.c").write_bytes(UTIL)
         files = {"makefile": MAKEFILE, "main": MAIN, "mw": MW, "util": UTIL}
@@ -151,8 +152,7 @@ def test_removing_an_unapplied_patch_leaves_the_tree(workshop: Workshop) -> None
 def test_another_tree_is_not_touched(workshop: Workshop, remove: bool, applied: bool) -> None:
     if applied:
         workshop.run()
-    main = workshop.tree / "src" / "main.c"
-    main.write_bytes(main.read_bytes().replace(b"loop();", b"loop(1);"))
+    workshop.main.write_bytes(workshop.main.read_bytes().replace(b"loop();", b"loop(1);"))
     (workshop.tree / "src" / "mw.h").unlink()
     files = " -- src/main.c src/mw.h" if applied else ""
     way_back = f"git -C {workshop.tree} checkout 0123abc{files}\n"
@@ -175,8 +175,7 @@ def test_a_checkout_with_dos_line_ends_is_reported(workshop: Workshop, remove: b
 
 
 def test_dos_line_ends_of_one_file_are_reported_with_other_differences(workshop: Workshop) -> None:
-    main = workshop.tree / "src" / "main.c"
-    main.write_bytes(MAIN.replace(b"\n", b"\r\n"))
+    workshop.main.write_bytes(MAIN.replace(b"\n", b"\r\n"))
     (workshop.tree / "src" / "mw.h").write_bytes(b"another\n")
     workshop.refuse("src/main.c: has CRLF line ends", "src/mw.h: has SHA-256")
 
@@ -188,8 +187,7 @@ LONG = b"".join(b"    line(%d);\n" % number for number in range(40))
 def clone(tmp_path: Path) -> Workshop:
     """A workshop whose tree is a git clone, and whose main.c has room for other changes."""
     workshop = Workshop(tmp_path)
-    main = workshop.tree / "src" / "main.c"
-    main.write_bytes(MAIN + LONG)
+    workshop.main.write_bytes(MAIN + LONG)
     patch = workshop.firmware / "patches" / "Tree.patch"
     short, long = (hashlib.sha256(content).hexdigest() for content in (MAIN, MAIN + LONG))
     patch.write_text(patch.read_text().replace(short, long))
@@ -199,8 +197,7 @@ def clone(tmp_path: Path) -> Workshop:
 
 @pytest.mark.parametrize("committed", [False, True])
 def test_a_tree_with_changes_of_its_own_is_merged(clone: Workshop, committed: bool) -> None:
-    main = clone.tree / "src" / "main.c"
-    main.write_bytes(main.read_bytes().replace(b"line(30)", b"line(31)"))
+    clone.main.write_bytes(clone.main.read_bytes().replace(b"line(30)", b"line(31)"))
     if committed:
         clone.git("commit", "-qam", "my defaults")
     mine = clone.files()
@@ -211,7 +208,7 @@ def test_a_tree_with_changes_of_its_own_is_merged(clone: Workshop, committed: bo
     assert patched["src/util.c"] == UTIL + b"int three(void);\n"
     assert clone.run() == (0, f"Tree: brought up to date; build it with make\n{note}")
     assert clone.files() == patched
-    main.write_bytes(main.read_bytes().replace(b"line(20)", b"line(21)"))
+    clone.main.write_bytes(clone.main.read_bytes().replace(b"line(20)", b"line(21)"))
     assert clone.run("--remove") == (0, f"Tree: restored to the state before the patch\n{note}")
     assert clone.files() == mine | {"src/main.c": mine["src/main.c"].replace(b"line(20)", b"line(21)")}
 
@@ -224,16 +221,14 @@ def test_a_change_of_a_file_that_the_patch_relies_on_is_reported(clone: Workshop
 
 
 def test_conflicts_are_named_by_file_and_line_and_the_tree_is_unchanged(clone: Workshop) -> None:
-    main = clone.tree / "src" / "main.c"
-    main.write_bytes(b"/* mine */\n\n" + MAIN + LONG)
+    clone.main.write_bytes(b"/* mine */\n\n" + MAIN + LONG)
     (clone.tree / "src" / "util.c").write_bytes(UTIL + b"int four(void);\n")
     clone.refuse("\n  src/main.c:1\n", "\n  src/util.c:2\n", code=2)
 
 
 def test_removing_keeps_a_changed_line_of_the_patch_as_a_conflict(clone: Workshop) -> None:
     clone.run()
-    main = clone.tree / "src" / "main.c"
-    main.write_bytes(main.read_bytes().replace(b"two();", b"two(2);"))
+    clone.main.write_bytes(clone.main.read_bytes().replace(b"two();", b"two(2);"))
     printed = clone.refuse(remove=True, code=2)
     assert re.search(r"^  src/main\.c:\d$", printed, re.MULTILINE)
 

@@ -113,8 +113,12 @@ def test_the_backlog_of_a_stalled_board_fits_the_ring(hang_s: float, baud: int, 
 # The link alone.
 
 
-def test_requests_wait_for_room_for_their_replies() -> None:
-    link = MspLink(115200, [], 0.0)
+@pytest.fixture
+def link() -> MspLink:
+    return MspLink(115200, [], 0.0)
+
+
+def test_requests_wait_for_room_for_their_replies(link: MspLink) -> None:
     for _ in range(5):
         link.send(question(195, 99), 0.0)
     assert sent(link) == [195, 195]
@@ -124,8 +128,7 @@ def test_requests_wait_for_room_for_their_replies() -> None:
     assert sent(link) == [195]
 
 
-def test_a_timed_out_request_counts_until_the_reply_can_no_longer_come() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_a_timed_out_request_counts_until_the_reply_can_no_longer_come(link: MspLink) -> None:
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
     link.send(question(195, 99), 0.0)
@@ -143,8 +146,7 @@ def test_a_timed_out_request_counts_until_the_reply_can_no_longer_come() -> None
     assert link.outstanding_bytes == 105
 
 
-def test_an_unanswered_request_is_forgotten_after_the_longest_stall() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_an_unanswered_request_is_forgotten_after_the_longest_stall(link: MspLink) -> None:
     link.receiver_timeout_s = 0.05
     link.send(question(195, 99), 0.0)
     link.send(question(195, 99), 0.0)
@@ -192,8 +194,7 @@ def test_lost_requests_do_not_block_a_repeat_to_a_board_that_answers() -> None:
     assert asked.count(195) == 2
 
 
-def test_a_reply_ends_earlier_requests() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_a_reply_ends_earlier_requests(link: MspLink) -> None:
     for command in (101, 106, 108):
         link.send(question(command, 11), 0.0)
     link.receive(reply(108, 11), 0.02)
@@ -201,8 +202,7 @@ def test_a_reply_ends_earlier_requests() -> None:
     assert link.requests_lost == 2
 
 
-def test_an_exclusive_request_is_sent_alone() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_an_exclusive_request_is_sent_alone(link: MspLink) -> None:
     link.send(question(191, 7, exclusive=True), 0.0)
     link.send(question(101, 11), 0.0)
     assert sent(link) == [191]
@@ -211,8 +211,7 @@ def test_an_exclusive_request_is_sent_alone() -> None:
     assert sent(link) == [101]
 
 
-def test_a_resync_waits_for_the_reply_to_an_exclusive_request() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_a_resync_waits_for_the_reply_to_an_exclusive_request(link: MspLink) -> None:
     link.send(question(101, 11), 0.0)
     now = link.due
     link.tick(now)
@@ -226,16 +225,14 @@ def test_a_resync_waits_for_the_reply_to_an_exclusive_request() -> None:
     assert RESYNC in _taken(link)
 
 
-def test_our_own_echo_is_not_a_reply() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_our_own_echo_is_not_a_reply(link: MspLink) -> None:
     link.send(question(101, 11), 0.0)
     assert link.receive(request(101), 0.01) == []
     assert link.outstanding_bytes == 17
     assert link.last_heard_at == 0.0
 
 
-def test_a_reply_behind_a_false_header_is_found_once_the_line_is_silent() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_a_reply_behind_a_false_header_is_found_once_the_line_is_silent(link: MspLink) -> None:
     link.send(question(101, 11), 0.0)
     assert link.receive(b"$M>\xf0" + reply(101, 11), 0.005) == []
     (found,) = link.tick(link.due)
@@ -255,16 +252,14 @@ def test_half_a_reply_is_not_thrown_away_because_another_request_timed_out() -> 
     assert found.command == 106
 
 
-def test_a_frame_with_a_hazard_byte_is_never_sent() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_a_frame_with_a_hazard_byte_is_never_sent(link: MspLink) -> None:
     with pytest.raises(AssertionError, match="hazard"):
         link.send(Send(request(100, b"\x0d"), 100, 13), 0.0)
     assert _taken(link) == []
 
 
-def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_accepts_them() -> None:
+def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_accepts_them(link: MspLink) -> None:
     """INAV opens its command line after a '#' and 100 ms of silence."""
-    link = MspLink(115200, [], 0.0)
     link.any_byte = True
     link.send(Send(request(100, b"#"), 100, 13), 0.0)
     assert sent(link) == [100]
@@ -276,8 +271,7 @@ def test_a_harmless_request_follows_a_frame_with_a_hazard_byte_if_the_board_acce
     assert sent(link) == []
 
 
-def test_any_other_request_serves_as_a_follow_up() -> None:
-    link = MspLink(115200, [], 0.0)
+def test_any_other_request_serves_as_a_follow_up(link: MspLink) -> None:
     link.any_byte = True
     link.send(Send(request(100, b"#"), 100, 13), 0.0)
     due = link.due

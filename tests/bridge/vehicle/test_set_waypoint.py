@@ -111,8 +111,12 @@ def results(station: GroundStation) -> list[int]:
     return [ack.result for ack in station.messages("COMMAND_ACK") if ack.command == SET_CURRENT]
 
 
-def test_the_craft_flies_to_the_item_and_continues() -> None:
-    flight = Flight().begin()
+@pytest.fixture
+def flight() -> Flight:
+    return Flight().begin()
+
+
+def test_the_craft_flies_to_the_item_and_continues(flight: Flight) -> None:
     other = GroundStation(flight.world, "other", sysid=254).stay_connected()
     flight.world.run(1)
     flight.station.received.clear()
@@ -126,8 +130,7 @@ def test_the_craft_flies_to_the_item_and_continues() -> None:
 
 
 @pytest.mark.parametrize("seq", [1, 6, 8])
-def test_each_leg_and_the_return_can_be_set(seq: int) -> None:
-    flight = Flight().begin()
+def test_each_leg_and_the_return_can_be_set(seq: int, flight: Flight) -> None:
     flight.ask(set_current(seq))
     assert flight.current()[-1] == seq
     assert [message.severity for message in flight.station.messages("STATUSTEXT") if "Set WP" in message.text] == []
@@ -138,16 +141,14 @@ def test_each_leg_and_the_return_can_be_set(seq: int) -> None:
     [long(3), m.MAVLink_command_int_message(1, 1, 0, SET_CURRENT, 0, 0, 3, 0, 0, 0, 0, 0, 0)],
     ids=lambda message: message.get_type(),
 )
-def test_the_command_is_acknowledged_once_it_is_flown(message: Message) -> None:
-    flight = Flight().begin()
+def test_the_command_is_acknowledged_once_it_is_flown(message: Message, flight: Flight) -> None:
     flight.ask(message)
     assert results(flight.station) == [ACCEPTED]
     assert flight.number == 3
     assert 3 in flight.current()
 
 
-def test_other_items_are_refused_with_the_reason() -> None:
-    flight = Flight().begin()
+def test_other_items_are_refused_with_the_reason(flight: Flight) -> None:
     refused = {
         0: "Set WP: item 0 is home",
         2: "Set WP: item 2 (DO_SET_ROI) is not flown to",
@@ -163,8 +164,7 @@ def test_other_items_are_refused_with_the_reason() -> None:
     assert (flight.sent(), flight.number) == ([], 1)
 
 
-def test_the_mission_is_not_reset() -> None:
-    flight = Flight().begin()
+def test_the_mission_is_not_reset(flight: Flight) -> None:
     flight.ask(long(1, resets=1))
     assert results(flight.station) == [DENIED]
     assert flight.sent() == []
@@ -180,8 +180,7 @@ def test_on_the_ground_and_outside_of_the_waypoint_mode_it_is_refused() -> None:
     assert flight.sent() == []
 
 
-def test_the_return_home_is_not_left() -> None:
-    flight = Flight().begin()
+def test_the_return_home_is_not_left(flight: Flight) -> None:
     flight.ask(set_current(8))
     flight.ask(long(3))
     assert results(flight.station) == [DENIED]
@@ -223,8 +222,7 @@ def test_older_versions_refuse_it(version: str) -> None:
     assert flight.number == 1
 
 
-def test_only_one_request_runs_at_a_time_and_repeats_are_not_sent() -> None:
-    flight = Flight().begin()
+def test_only_one_request_runs_at_a_time_and_repeats_are_not_sent(flight: Flight) -> None:
     for seq in (3, 3, 6):
         flight.station.send(long(seq))
     flight.world.run(1)
@@ -233,9 +231,8 @@ def test_only_one_request_runs_at_a_time_and_repeats_are_not_sent() -> None:
     assert "Set WP: another request is running, try again" in flight.station.texts()
 
 
-def test_a_repeated_request_gets_the_same_item() -> None:
+def test_a_repeated_request_gets_the_same_item(flight: Flight) -> None:
     """MAVSDK, which requests no streams."""
-    flight = Flight().begin()
     flight.world.run_until(lambda _: bool(flight.current()), 2)
     flight.station.received.clear()
     flight.ask(set_current(3), seconds=3)

@@ -43,6 +43,11 @@ def frame_of(side: mavlink.MAVLink, message: mavlink.MAVLink_message = HEARTBEAT
     return MavlinkFrame(bytes(message.pack(side)))
 
 
+@pytest.fixture
+def signing() -> Signing:
+    return our_side()
+
+
 def test_the_key_is_derived_like_mission_planners() -> None:
     assert key_from_passphrase("grüezi") == sha256("grüezi".encode()).digest()
 
@@ -55,8 +60,7 @@ def test_timestamps_count_10_us_since_2015() -> None:
 
 
 @pytest.mark.parametrize("link_id", [0, 3, 255])
-def test_pymavlink_accepts_our_signatures(link_id: int) -> None:
-    signing = our_side()
+def test_pymavlink_accepts_our_signatures(link_id: int, signing: Signing) -> None:
     writer = FrameWriter(1, 1, SignedPeer(signing, link_id, "gcs").sign)
     receiver = pymavlink_side()
     for count in range(300):
@@ -71,14 +75,12 @@ def test_pymavlink_accepts_our_signatures(link_id: int) -> None:
         stranger.parse_buffer(writer.frame(pack(HEARTBEAT), 2))
 
 
-def test_a_mavlink_1_frame_is_never_signed() -> None:
-    signing = our_side()
+def test_a_mavlink_1_frame_is_never_signed(signing: Signing) -> None:
     signed = FrameWriter(1, 1, SignedPeer(signing, 0, "gcs").sign)
     assert signed.frame(pack(HEARTBEAT), 1) == FrameWriter(1, 1).frame(pack(HEARTBEAT), 1)
 
 
-def test_we_accept_pymavlinks_signatures() -> None:
-    signing = our_side()
+def test_we_accept_pymavlinks_signatures(signing: Signing) -> None:
     side = pymavlink_side()
     data = b"".join(frame_of(side, mavlink.MAVLink_ping_message(n, n, 1, 1)).raw for n in range(300))
     frames = MavlinkSplitter().feed(data)
@@ -94,8 +96,7 @@ def test_unsigned_frames_of_both_versions_are_recognised() -> None:
         assert our_side().check(MavlinkFrame(bytes(HEARTBEAT.pack(side, force_mavlink1=mavlink_1)))) is Check.UNSIGNED
 
 
-def test_a_frame_with_another_key_is_refused_and_does_not_change_a_state() -> None:
-    signing = our_side()
+def test_a_frame_with_another_key_is_refused_and_does_not_change_a_state(signing: Signing) -> None:
     far_ahead = ticks(NOON) + TOLERANCE
     assert signing.check(frame_of(pymavlink_side(sha256(b"").digest(), far_ahead))) is Check.WRONG
     # Mission Planner signs with 32 zero bytes before it has a key.
@@ -111,8 +112,7 @@ def test_any_flipped_bit_is_detected(at: int, bit: int) -> None:
     assert our_side().check(MavlinkFrame(bytes(raw))) is not Check.VALID
 
 
-def test_each_stream_has_its_own_timestamps() -> None:
-    signing = our_side()
+def test_each_stream_has_its_own_timestamps(signing: Signing) -> None:
     for link_id in (1, 2):
         for timestamp in (ticks(NOON), ticks(NOON) + 1, ticks(NOON) + 3):
             assert signing.check(frame_of(pymavlink_side(timestamp=timestamp, link_id=link_id))) is Check.VALID
@@ -127,8 +127,7 @@ def test_a_new_stream_is_at_most_a_minute_behind_us(lag: int, expected: Check) -
     assert our_side().check(frame_of(pymavlink_side(timestamp=ticks(NOON) - lag))) is expected
 
 
-def test_a_known_stream_may_fall_behind_others() -> None:
-    signing = our_side()
+def test_a_known_stream_may_fall_behind_others(signing: Signing) -> None:
     slow = pymavlink_side(timestamp=ticks(NOON) - 100, link_id=1)
     assert signing.check(frame_of(slow)) is Check.VALID
     assert signing.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 10 * TOLERANCE, link_id=2))) is Check.VALID
@@ -172,8 +171,7 @@ def test_without_a_clock_timestamps_continue() -> None:
 
 
 @pytest.mark.parametrize("timestamp", [ticks(NOON) + DAY + 1, (1 << 48) - 1])
-def test_a_time_over_a_day_ahead_of_every_clock_is_refused(timestamp: int) -> None:
-    signing = our_side()
+def test_a_time_over_a_day_ahead_of_every_clock_is_refused(timestamp: int, signing: Signing) -> None:
     assert signed_at(signing, timestamp, "wrong clock") is Check.EARLY
     assert signed_at(signing, ticks(NOON), "right clock") is Check.VALID
     # The clocks of stations count.
@@ -181,8 +179,7 @@ def test_a_time_over_a_day_ahead_of_every_clock_is_refused(timestamp: int) -> No
     assert signed_at(signing, ticks(NOON) + 2 * DAY, "another", 1) is Check.VALID
 
 
-def test_our_time_follows_two_hosts_that_agree_but_not_a_single_host() -> None:
-    signing = our_side()
+def test_our_time_follows_two_hosts_that_agree_but_not_a_single_host(signing: Signing) -> None:
     later = ticks(NOON) + 3600 * TICKS_PER_S
     for link_id in range(3):  # several programs of one laptop
         assert signed_at(signing, later, "one", link_id) is Check.VALID
@@ -194,9 +191,8 @@ def test_our_time_follows_two_hosts_that_agree_but_not_a_single_host() -> None:
 
 
 @pytest.mark.parametrize("lead", [3600 * TICKS_PER_S, 2 * DAY])
-def test_frames_to_a_peer_use_the_peers_time(lead: int) -> None:
+def test_frames_to_a_peer_use_the_peers_time(lead: int, signing: Signing) -> None:
     """Even if its frames are refused: it would not accept the reason otherwise."""
-    signing = our_side()
     ahead, other = SignedPeer(signing, 0, "ahead"), SignedPeer(signing, 0, "other")
     ahead.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + lead)))
     sent = [sent_at(ahead) for _ in range(3)]
@@ -230,8 +226,7 @@ def test_frames_received_in_an_earlier_run_are_replays() -> None:
     assert much_after.check(frame_of(pymavlink_side(timestamp=ticks(NOON) + 1))) is Check.LATE
 
 
-def test_the_largest_timestamp_does_not_raise() -> None:
-    signing = our_side()
+def test_the_largest_timestamp_does_not_raise(signing: Signing) -> None:
     peer = SignedPeer(signing, 0, "gcs")
     assert peer.check(frame_of(pymavlink_side(timestamp=(1 << 48) - 1))) is Check.EARLY
     assert len(peer.sign(bytes(10))) == 13
