@@ -5,6 +5,12 @@ import pytest
 from tests.support.world import GroundStation, World, ready_world
 
 
+@pytest.fixture
+def world() -> World:
+    """A world whose board has been found."""
+    return ready_world()
+
+
 @pytest.fixture(scope="module")
 def flying() -> tuple[World, GroundStation]:
     """A world whose board has a fix and a home."""

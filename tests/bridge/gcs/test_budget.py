@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from bridge.gcs.budget import Budget, Budgets, Cost
-from tests.support.world import GroundStation, ready_world
+from tests.support.world import GroundStation, World
 
 
 def spent(budget: Budget, cost: Cost, now: float = 0.0, *, is_proven: bool = False) -> int:
@@ -67,8 +67,7 @@ def test_one_stranger_leaves_half_of_the_flash_writes_to_others() -> None:
     assert spent(budgets.of("pilot"), Cost.FLASH) == 200
 
 
-def test_a_flood_of_counts_is_not_logged() -> None:
-    world = ready_world()
+def test_a_flood_of_counts_is_not_logged(world: World) -> None:
     station = GroundStation(world)
     world.arm(5)
     for number in range(2000):
@@ -80,9 +79,8 @@ def test_a_flood_of_counts_is_not_logged() -> None:
     assert "Too many uploads: wait a few seconds" in station.texts()
 
 
-def test_strangers_requests_do_not_reach_an_armed_board() -> None:
+def test_strangers_requests_do_not_reach_an_armed_board(world: World) -> None:
     """MISSION_CLEAR_ALL while armed once made it send eight times as much as telemetry does."""
-    world = ready_world()
     stranger = GroundStation(world)
     stranger.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     world.arm(5)

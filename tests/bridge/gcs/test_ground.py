@@ -16,7 +16,7 @@ from protocols.mavlink.dialect import messages as own
 from protocols.mavlink.frame import MavlinkSplitter
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Upload, waypoints
-from tests.support.world import GroundStation, ready_world
+from tests.support.world import GroundStation, World
 
 m = messages
 
@@ -30,8 +30,7 @@ def versions(station: GroundStation, *, heartbeats: bool = True) -> set[int]:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_each_station_is_answered_in_its_own_version(version: int) -> None:
-    world = ready_world()
+def test_each_station_is_answered_in_its_own_version(world: World, version: int) -> None:
     station = GroundStation(world, version=version)
     other = GroundStation(world, "other", sysid=250, version=3 - version)
     for one in (station, other):
@@ -47,9 +46,8 @@ def test_each_station_is_answered_in_its_own_version(version: int) -> None:
 
 
 @pytest.mark.parametrize("first", ["heartbeat", "request"])
-def test_the_first_frame_to_a_newcomer_is_mavlink_2(first: str) -> None:
+def test_the_first_frame_to_a_newcomer_is_mavlink_2(world: World, first: str) -> None:
     """QGroundControl begins in MAVLink 1, and stays in the version of the first frame that it gets."""
-    world = ready_world()
     station = GroundStation(world, version=1)
     station.send(station.heartbeat if first == "heartbeat" else m.MAVLink_param_request_list_message(1, 1), wait_s=3)
     assert station.frames[0][0] == 0xFD
@@ -57,8 +55,7 @@ def test_the_first_frame_to_a_newcomer_is_mavlink_2(first: str) -> None:
     assert [frame[5] for frame in station.frames if frame[0] == 0xFE].count(m.MAVLINK_MSG_ID_HEARTBEAT) > 10
 
 
-def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
-    world = ready_world()
+def test_a_station_that_switches_to_mavlink_2_is_answered_in_it(world: World) -> None:
     station = GroundStation(world, version=1)
     station.send(station.heartbeat, wait_s=1.5)
     station.version = 2
@@ -70,9 +67,8 @@ def test_a_station_that_switches_to_mavlink_2_is_answered_in_it() -> None:
     assert versions(station) == {2}
 
 
-def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
+def test_a_new_station_gets_faster_heartbeats_for_three_seconds(world: World) -> None:
     """Mission Planner needs two heartbeats before it continues connecting."""
-    world = ready_world()
     old, new = GroundStation(world, "old"), GroundStation(world, "new", sysid=254)
     old.send(old.heartbeat, wait_s=5)
     old.take()
@@ -83,9 +79,8 @@ def test_a_new_station_gets_faster_heartbeats_for_three_seconds() -> None:
     assert len(new.messages("HEARTBEAT")) == 10
 
 
-def test_messages_of_one_moment_share_datagrams() -> None:
+def test_messages_of_one_moment_share_datagrams(world: World) -> None:
     """Up to 280 bytes, in order; MAVROS cuts longer ones."""
-    world = ready_world()
     station = GroundStation(world)
     station.send(station.heartbeat, wait_s=5)
     ground = world.inside.ground
@@ -100,8 +95,7 @@ def test_messages_of_one_moment_share_datagrams() -> None:
     assert [frame.payload[4] for frame in frames] == [value.value for value in values]
 
 
-def test_a_station_silent_for_a_minute_stops_getting_messages() -> None:
-    world = ready_world()
+def test_a_station_silent_for_a_minute_stops_getting_messages(world: World) -> None:
     station = GroundStation(world)
     for _ in range(2):
         station.send(station.heartbeat, wait_s=59)
@@ -116,8 +110,7 @@ def test_a_station_silent_for_a_minute_stops_getting_messages() -> None:
     assert station.messages("HEARTBEAT")
 
 
-def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
-    world = ready_world()
+def test_a_default_peer_always_gets_messages_in_both_versions(world: World) -> None:
     station = GroundStation(world, "fixed")
     world.bridge.add_default_peer(station.peer, until_answered=False)
     world.run(5)
@@ -133,8 +126,7 @@ def test_a_default_peer_always_gets_messages_in_both_versions() -> None:
     assert station.received == []
 
 
-def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
-    world = ready_world()
+def test_a_broadcast_address_is_used_until_a_station_answers(world: World) -> None:
     everyone = GroundStation(world, "broadcast")
     world.bridge.add_default_peer(everyone.peer, until_answered=True)
     world.run(3)
@@ -149,9 +141,8 @@ def test_a_broadcast_address_is_used_until_a_station_answers() -> None:
     assert everyone.messages("HEARTBEAT")
 
 
-def test_local_strangers_do_not_displace_a_station_with_heartbeats() -> None:
+def test_local_strangers_do_not_displace_a_station_with_heartbeats(world: World) -> None:
     """Two thousand datagrams a second, from ports of one machine and from two hundred machines."""
-    world = ready_world()
     pilot, late = (GroundStation(world, (f"192.168.4.{each}", 14550)) for each in (2, 3))
     stranger = GroundStation(world, "stranger", sysid=9).pack(pilot.heartbeat)
 
@@ -174,9 +165,8 @@ def test_local_strangers_do_not_displace_a_station_with_heartbeats() -> None:
     assert late.messages("HEARTBEAT", "ATTITUDE")
 
 
-def test_more_talkers_than_places_do_not_displace_a_station_with_heartbeats() -> None:
+def test_more_talkers_than_places_do_not_displace_a_station_with_heartbeats(world: World) -> None:
     """Fifty machines, each heard 50 times a second and thus later than the pilot."""
-    world = ready_world()
     pilot = GroundStation(world, ("192.168.4.2", 14550))
     stranger = GroundStation(world, "stranger", sysid=9).pack(pilot.heartbeat)
 
@@ -196,8 +186,7 @@ def test_more_talkers_than_places_do_not_displace_a_station_with_heartbeats() ->
     assert len(world.inside.ground.peers()) == 32
 
 
-def test_thirty_stations_that_request_everything_share_1200_messages_a_second() -> None:
-    world = ready_world()
+def test_thirty_stations_that_request_everything_share_1200_messages_a_second(world: World) -> None:
     stations = [GroundStation(world, str(number), sysid=number) for number in range(1, 31)]
     for station in stations:
         station.send(station.heartbeat)
@@ -221,8 +210,7 @@ def test_a_thousand_peers_all_get_telemetry() -> None:
     assert taken == {station.peer for station in stations}
 
 
-def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_the_end() -> None:
-    world = ready_world()
+def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_the_end(world: World) -> None:
     station = GroundStation(world, "tcp")
     data = station.pack(station.heartbeat) + station.pack(
         m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -242,8 +230,7 @@ def test_a_stream_may_be_split_over_reads_and_is_forgotten_at_the_end() -> None:
     assert world.inside.ground.station(station.peer) is None
 
 
-def test_a_truncated_datagram_does_not_affect_the_next() -> None:
-    world = ready_world()
+def test_a_truncated_datagram_does_not_affect_the_next(world: World) -> None:
     station = GroundStation(world)
     command = station.pack(m.MAVLink_command_long_message(1, 1, 511, 0, 0, 0, 0, 0, 0, 0, 0))
     for datagram in (command[:10], b"\xfd\xff" + command, command + command, b"\xfe\x09" + command[:5]):
@@ -252,8 +239,7 @@ def test_a_truncated_datagram_does_not_affect_the_next() -> None:
     assert len(station.messages("COMMAND_ACK")) == 3
 
 
-def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone() -> None:
-    world = ready_world()
+def test_the_pieces_of_a_long_text_can_be_joined_or_read_alone(world: World) -> None:
     stations = [GroundStation(world, "new"), GroundStation(world, "old", version=1, sysid=254)]
     for station in stations:
         station.send(station.heartbeat)

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as messages
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message
 from protocols.msp.commands import Msp
-from tests.support.world import GroundStation, World, ready_world
+from tests.support.world import GroundStation, World
 
 m = messages
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -18,11 +18,6 @@ ATTITUDE, GPS_RAW_INT = m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GPS_RAW_INT
 _UNASKED = {"HEARTBEAT", "HOME_POSITION"}
 #: Mission Planner's requests (stream, rate), sent twice at the first heartbeat.
 MISSION_PLANNER = ((2, 2), (6, 2), (10, 4), (11, 4), (12, 2), (1, 2), (3, 2))
-
-
-@pytest.fixture
-def world() -> World:
-    return ready_world()
 
 
 def station_of(world: World, name: str) -> GroundStation:

@@ -63,8 +63,7 @@ class Roamer:
         return station
 
 
-def test_the_new_address_is_served_at_once() -> None:
-    world = ready_world()
+def test_the_new_address_is_served_at_once(world: World) -> None:
     roamer = Roamer(world)
     world.run(3)
     new = roamer.move()
@@ -74,9 +73,8 @@ def test_the_new_address_is_served_at_once() -> None:
     assert world.inside.ground.peers() == [new.peer]
 
 
-def test_two_stations_with_the_same_ids_stay_separate() -> None:
+def test_two_stations_with_the_same_ids_stay_separate(world: World) -> None:
     """Two Mission Planners with their default ids."""
-    world = ready_world()
     both = [GroundStation(world, name) for name in ("one", "other")]
     for station in both:
         send_heartbeats(station, both)
@@ -118,9 +116,8 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_upload() -> Non
         assert world.stored == records_of(plan)
 
 
-def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list() -> None:
+def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list(world: World) -> None:
     """Its item 0 would complete the previous list of one item, and its own list would get that list's refusal."""
-    world = ready_world()
     roamer = Roamer(world)
     former = Upload(roamer.station, PLAN[:1])
     former.stop()
@@ -132,8 +129,7 @@ def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list() -> No
     assert world.stored == records_of(PLAN)
 
 
-def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
-    world = ready_world()
+def test_the_result_of_an_upload_goes_to_the_new_address(world: World) -> None:
     roamer = Roamer(world)
     upload = Upload(roamer.station, PLAN)
     world.wait_until(lambda _: len(upload.requested) > 20, 5)
@@ -144,9 +140,8 @@ def test_the_result_of_an_upload_goes_to_the_new_address() -> None:
     assert Upload(new, PLAN).run() is MissionResult.ACCEPTED
 
 
-def test_a_second_station_with_the_same_ids_cannot_join_an_upload() -> None:
+def test_a_second_station_with_the_same_ids_cannot_join_an_upload(world: World) -> None:
     """It was known before, or the first one is still active: its items are ignored."""
-    world = ready_world()
     first, second = GroundStation(world, "first", radio=WIFI), GroundStation(world, "second")
     second.send(heartbeat(), wait_s=0.5)
     upload = Upload(first, PLAN)
@@ -179,8 +174,7 @@ def test_an_address_that_may_not_write_does_not_take_over_an_upload() -> None:
     assert world.stored == ()
 
 
-def test_a_download_continues_from_a_new_address() -> None:
-    world = ready_world()
+def test_a_download_continues_from_a_new_address(world: World) -> None:
     roamer = Roamer(world)
     assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
     download = Download(roamer.station)

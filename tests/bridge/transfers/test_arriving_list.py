@@ -107,8 +107,7 @@ def test_two_lists_are_never_mixed_if_the_first_was_stuck_and_the_second_count_i
     assert_written_on_request(world, station, latter)
 
 
-def test_a_list_is_requested_twice_if_a_frame_was_lost() -> None:
-    world, station = holding()
+def test_a_list_is_requested_twice_if_a_frame_was_lost(world: World, station: GroundStation) -> None:
     items = waypoints(6)
 
     def lose(message: Message) -> None:
@@ -147,8 +146,7 @@ def test_a_list_whose_last_item_follows_a_lost_frame_is_requested_again() -> Non
     assert world.stored == records_of(waypoints(20, seed=77))
 
 
-def test_a_delayed_message_count_does_not_begin_the_list_again() -> None:
-    world, station = holding()
+def test_a_delayed_message_count_does_not_begin_the_list_again(world: World, station: GroundStation) -> None:
     items = waypoints(6)
     late = station.pack(count_message(6))
     receiving(world, station, items, 3)
@@ -214,8 +212,7 @@ def test_a_repeated_item_gets_one_request_and_is_ignored() -> None:
     finish(world, station, items, 5)
 
 
-def test_duplicates_from_the_network_do_not_multiply_requests() -> None:
-    world, station = holding()
+def test_duplicates_from_the_network_do_not_multiply_requests(world: World, station: GroundStation) -> None:
     items = waypoints(40)
     station.radio = Radio(repeat=0.1, delay_s=0.03, spread_s=0.02)
     upload = Upload(station, items, repeat_s=20)

@@ -40,6 +40,11 @@ def holding(options: SimOptions | None = None, flash: bytes = OLD_FLASH) -> tupl
     return world, GroundStation(world)
 
 
+@pytest.fixture
+def world() -> World:
+    return holding()[0]
+
+
 def ask(station: GroundStation, message: Message, seconds: float = 0.2) -> list[Message]:
     """Send a message; return the mission messages addressed to the sender in reply."""
     station.ask(message, wait_s=seconds)
@@ -55,8 +60,7 @@ def reads(world: World) -> int:
 
 
 @pytest.mark.parametrize("as_int", [True, False])
-def test_the_list_reads_back_as_it_is_stored(as_int: bool) -> None:
-    _, station = holding()
+def test_the_list_reads_back_as_it_is_stored(station: GroundStation, as_int: bool) -> None:
     download = Download(station, as_int=as_int)
     items = download.run()
     assert download.count == 20
@@ -66,9 +70,8 @@ def test_the_list_reads_back_as_it_is_stored(as_int: bool) -> None:
     assert kinds == ["MISSION_ITEM_INT" if as_int else "MISSION_ITEM"] * 20
 
 
-def test_a_list_changed_on_the_board_is_read_again() -> None:
+def test_a_list_changed_on_the_board_is_read_again(world: World, station: GroundStation) -> None:
     """The bridge answers from its copy only while the board still holds the same list."""
-    world, station = holding()
     assert Download(station).run() != []
     before = reads(world)
     assert Download(station).run() != []
@@ -85,8 +88,7 @@ def test_a_list_changed_on_the_board_is_read_again() -> None:
 
 
 @pytest.mark.parametrize("remembered", [True, False])
-def test_a_region_of_interest_reads_back_as_it_was_sent(remembered: bool) -> None:
-    world, station = holding()
+def test_a_region_of_interest_reads_back_as_it_was_sent(world: World, station: GroundStation, remembered: bool) -> None:
     items = waypoints(6, 8)
     for seq, command in ((1, Command.DO_SET_ROI), (2, Command.DO_SET_ROI_LOCATION), (3, Command.NAV_ROI)):
         items[seq] = replace(items[seq], command=command, p2=0.0, alt_m=0.0)
@@ -126,25 +128,22 @@ def test_item_0_of_an_empty_list_is_the_flight_controllers_home(as_int: bool) ->
     assert item.x != 0
 
 
-def test_a_seq_past_the_end_is_an_invalid_sequence() -> None:
-    _, station = holding()
+def test_a_seq_past_the_end_is_an_invalid_sequence(station: GroundStation) -> None:
     for seq in (20, 65535):
         (ack,) = ask(station, request_message(seq))
         assert (ack.get_type(), ack.type) == ("MISSION_ACK", A.INVALID_SEQUENCE)
 
 
 @pytest.mark.parametrize("mission_type", [1, 2])
-def test_a_list_that_is_not_stored_here_reads_as_empty(mission_type: int) -> None:
+def test_a_list_that_is_not_stored_here_reads_as_empty(station: GroundStation, mission_type: int) -> None:
     """Mission Planner ignores a refusal, and shows a timeout instead."""
-    _, station = holding()
     (count,) = [each for each in ask(station, list_message(mission_type)) if each.get_type() != "STATUSTEXT"]
     assert (count.get_type(), count.count, count.mission_type) == ("MISSION_COUNT", 0, mission_type)
     assert station.texts() == ["Fences and rally points are not stored here"]
 
 
 @pytest.mark.parametrize("mission_type", [1, 2, 7, 255])
-def test_another_mission_type_is_unsupported(mission_type: int) -> None:
-    _, station = holding()
+def test_another_mission_type_is_unsupported(station: GroundStation, mission_type: int) -> None:
     for message in (
         *([list_message(mission_type)] if mission_type > 2 else []),
         request_message(0, mission_type=mission_type),
@@ -154,9 +153,8 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
         assert (ack.type, ack.mission_type) == (A.UNSUPPORTED, mission_type)
 
 
-def test_item_0_alone_has_the_altitude_of_home_while_armed() -> None:
+def test_item_0_alone_has_the_altitude_of_home_while_armed(world: World, station: GroundStation) -> None:
     """Mission Planner requests it on arming, and takes its ground level from it."""
-    world, station = holding()
     world.arm(then_s=1)
     home = world.bridge.vehicle.home
     assert home is not None
@@ -179,9 +177,8 @@ def test_a_download_is_a_snapshot_unaffected_by_an_upload() -> None:
 
 
 @pytest.mark.parametrize("ends", ["ack", "time", "new flight controller", "own upload"])
-def test_a_snapshot_ends_with_the_download(ends: str) -> None:
+def test_a_snapshot_ends_with_the_download(world: World, station: GroundStation, ends: str) -> None:
     """Mission Planner asks for item 0 on arming, long after it read a list that has been replaced since."""
-    world, station = holding()
     writer = GroundStation(world, "writer", sysid=250)
     assert ask(station, list_message())[0].count == 20
     for seq in range(20):
@@ -215,8 +212,7 @@ def test_a_download_over_a_bad_radio_link_is_exact(seed: int) -> None:
     assert Download(station, repeat_s=0.6, tries=20).run() == OLD
 
 
-def test_a_station_that_floods_requests_does_not_delay_others() -> None:
-    world, station = holding()
+def test_a_station_that_floods_requests_does_not_delay_others(world: World, station: GroundStation) -> None:
     second = GroundStation(world, "second", sysid=250)
     for number in range(4000):
         station.send(list_message())
@@ -373,9 +369,8 @@ def test_a_download_ends_the_stations_own_silent_upload_without_an_ack(sent: int
     assert not any("silent" in text for text in station.texts())
 
 
-def test_a_delayed_list_request_does_not_end_an_upload() -> None:
+def test_a_delayed_list_request_does_not_end_an_upload(world: World, station: GroundStation) -> None:
     """The network may deliver the list request of an earlier Read again."""
-    world, station = holding()
     items = waypoints(30, 4)
     station.radio = Radio(delay_s=0.02)
     upload = Upload(station, items)
@@ -384,8 +379,7 @@ def test_a_delayed_list_request_does_not_end_an_upload() -> None:
     assert upload.run() is A.ACCEPTED
 
 
-def test_mission_current_has_the_number_of_items_held() -> None:
-    world, station = holding()
+def test_mission_current_has_the_number_of_items_held(world: World, station: GroundStation) -> None:
     station.send(count_message(1), wait_s=1.5)
     current = station.messages("MISSION_CURRENT")[-1]
     assert (current.seq, current.total, current.mission_state) == (0, 19, 2)

@@ -3,11 +3,11 @@
 
 from bridge.transfers.upload_states import Delivering
 from tests.support.conversations import ack_message, count_message, item_message, records_of, waypoints
-from tests.support.upload_bench import OLD, A, acks, hanging_push, holding, requested, state
+from tests.support.upload_bench import OLD, A, acks, hanging_push, requested, state
+from tests.support.world import GroundStation, World
 
 
-def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
-    world, station = holding()
+def test_an_upload_during_a_push_from_the_command_line_is_denied(world: World, station: GroundStation) -> None:
     hanging_push(world)
     for message in (count_message(5), count_message(5), item_message(0, OLD[1]), ack_message(A.ACCEPTED)):
         station.send(message)
@@ -18,8 +18,7 @@ def test_an_upload_during_a_push_from_the_command_line_is_denied() -> None:
     assert station.texts() == ["Another mission transfer is running: try again"]
 
 
-def test_the_command_line_and_a_ground_station_exclude_each_other() -> None:
-    world, station = holding()
+def test_the_command_line_and_a_ground_station_exclude_each_other(world: World, station: GroundStation) -> None:
     outcome = world.push(waypoints(146))
     station.send(count_message(5), wait_s=0.05)
     assert requested(station) == []

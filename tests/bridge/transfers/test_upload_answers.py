@@ -19,10 +19,10 @@ from tests.support.upload_bench import (
     requested,
     state,
 )
+from tests.support.world import GroundStation, World
 
 
-def test_a_refusal_is_remembered_for_ten_seconds() -> None:
-    world, station = holding()
+def test_a_refusal_is_remembered_for_ten_seconds(world: World, station: GroundStation) -> None:
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     world.run(10.5)
     station.ask(partial_list_message(), wait_s=1)
@@ -61,9 +61,8 @@ def test_a_lost_final_ack_is_sent_again() -> None:
     assert acks(station) == [A.ACCEPTED]
 
 
-def test_the_final_ack_is_repeated_before_the_station_can_go_on() -> None:
+def test_the_final_ack_is_repeated_before_the_station_can_go_on(world: World, station: GroundStation) -> None:
     """QGroundControl never asks for it again, and takes one that comes during its next transfer for that one's end."""
-    world, station = holding()
     station.send(QGC_HEARTBEAT)
     receiving(world, station, waypoints(8), 8)
     world.run(5)

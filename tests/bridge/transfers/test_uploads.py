@@ -50,8 +50,7 @@ from tests.support.world import GroundStation, Radio, World, flash_holding, read
 
 
 @pytest.mark.parametrize("mission_type", [1, 2, 7, 255])
-def test_another_mission_type_is_unsupported(mission_type: int) -> None:
-    world, station = holding()
+def test_another_mission_type_is_unsupported(world: World, station: GroundStation, mission_type: int) -> None:
     for message in (
         count_message(5, mission_type),
         item_message(0, OLD[0], mission_type=mission_type),
@@ -66,8 +65,7 @@ def test_another_mission_type_is_unsupported(mission_type: int) -> None:
     assert world.stored == OLD_RECORDS
 
 
-def test_another_mission_type_does_not_disturb_a_transfer() -> None:
-    world, station = holding()
+def test_another_mission_type_does_not_disturb_a_transfer(world: World, station: GroundStation) -> None:
     station.radio = Radio(delay_s=0.002)
     upload = Upload(station, waypoints(30))
     for number in range(10):
@@ -77,8 +75,7 @@ def test_another_mission_type_does_not_disturb_a_transfer() -> None:
     assert world.stored == records_of(waypoints(30))
 
 
-def test_an_upload_while_armed_is_denied() -> None:
-    world, station = holding()
+def test_an_upload_while_armed_is_denied(world: World, station: GroundStation) -> None:
     world.arm(then_s=1)
     refused(world, station, 5, A.DENIED, "disarm")
     world.faults.armed = False
@@ -108,8 +105,7 @@ def listen_for_acks(world: World, station: GroundStation) -> list[tuple[WpRecord
 
 
 @pytest.mark.parametrize("message", [count_message(0), clear_message(), clear_message(255)])
-def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
-    world, station = holding()
+def test_clear_all_clears_the_list_and_verifies_it(world: World, station: GroundStation, message: Message) -> None:
     stored_at_ack = listen_for_acks(world, station)
     station.send(message)
     world.wait_until(lambda _: bool(acks(station)), 2)
@@ -121,18 +117,16 @@ def test_clear_all_clears_the_list_and_verifies_it(message: Message) -> None:
     assert world.naze.counters.flash_writes == 2
 
 
-def test_home_alone_is_invalid() -> None:
+def test_home_alone_is_invalid(world: World, station: GroundStation) -> None:
     """Mission Planner's empty Write; a count of 1 is first answered with a request for the item."""
-    world, station = holding()
     assert Upload(station, waypoints(1)).run() is A.INVALID
     assert "Mission rejected: only home, without a command" in station.texts()
     assert_refusal_is_repeated(world, station, A.INVALID)
     assert world.stored == OLD_RECORDS
 
 
-def test_one_item_of_zeros_clears() -> None:
+def test_one_item_of_zeros_clears(world: World, station: GroundStation) -> None:
     """MAVSDK's clear_mission on an ARDUPILOTMEGA vehicle."""
-    world, station = holding()
     blank = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     assert Upload(station, [blank]).run() is A.ACCEPTED
     assert world.stored == ()
@@ -150,9 +144,8 @@ def test_more_than_the_flight_controller_holds_is_refused_with_no_space(capacity
     assert Upload(station, waypoints(capacity)).run() is A.ACCEPTED
 
 
-def test_two_simultaneous_uploads_both_succeed() -> None:
+def test_two_simultaneous_uploads_both_succeed(world: World, station: GroundStation) -> None:
     """They are received in parallel, and the list completed last is written last."""
-    world, station = holding()
     second = GroundStation(world, "second", sysid=254, radio=Radio(delay_s=0.002))
     station.radio = Radio(delay_s=0.002)
     uploads = [Upload(station, waypoints(100)), Upload(second, waypoints(30, 1), repeat_s=0.7, tries=4)]
@@ -177,9 +170,8 @@ def test_a_slow_upload_does_not_delay_others() -> None:
     assert world.stored == records_of(waypoints(4, 1))
 
 
-def test_unfinished_uploads_do_not_delay_others() -> None:
+def test_unfinished_uploads_do_not_delay_others(world: World, station: GroundStation) -> None:
     """The ones with the slowest progress end."""
-    world, station = holding()
     station.radio = Radio(delay_s=0.03)
     station.send(messages.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     for number in range(90):
@@ -194,8 +186,7 @@ def test_unfinished_uploads_do_not_delay_others() -> None:
     assert state(world) is None
 
 
-def test_only_some_cancelled_lists_are_stored() -> None:
-    world, station = holding()
+def test_only_some_cancelled_lists_are_stored(world: World, station: GroundStation) -> None:
     for _ in range(60):
         station.ask(count_message(3))
         world.wait_until(lambda _: bool(requested(station)), 2)
@@ -241,8 +232,7 @@ def test_a_complete_list_that_waits_too_long_is_denied() -> None:
 
 
 @pytest.mark.parametrize("message", [count_message(0), ack_message(A.OPERATION_CANCELLED)])
-def test_a_waiting_upload_can_be_cancelled(message: Message) -> None:
-    world, station = holding()
+def test_a_waiting_upload_can_be_cancelled(world: World, station: GroundStation, message: Message) -> None:
     second = GroundStation(world, "second", sysid=254)
     receiving(world, station, waypoints(8), 3)
     second.send(count_message(5))
@@ -315,9 +305,8 @@ def test_the_same_station_restarts_while_the_list_is_written(after_s: float) -> 
     assert state(world) is None
 
 
-def test_a_list_takes_the_place_of_a_waiting_clear() -> None:
+def test_a_list_takes_the_place_of_a_waiting_clear(world: World, station: GroundStation) -> None:
     """DroneKit sends both at once. The final ack is of the list's mission type."""
-    world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     receiving(world, other, waypoints(30, 1), 30)
     station.send(clear_message(255))
@@ -340,14 +329,12 @@ def busy_for(world: World, seconds: float) -> None:
     world.after(seconds, lambda: setattr(world.faults, "busy", False))
 
 
-def test_an_upload_waits_for_a_flash_write() -> None:
-    world, station = holding()
+def test_an_upload_waits_for_a_flash_write(world: World, station: GroundStation) -> None:
     busy_for(world, 0.7)
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
-def test_an_upload_during_a_long_flash_write_is_denied() -> None:
-    world, station = holding()
+def test_an_upload_during_a_long_flash_write_is_denied(world: World, station: GroundStation) -> None:
     busy_for(world, 3)
     began = world.now
     station.send(count_message(5))
@@ -358,8 +345,7 @@ def test_an_upload_during_a_long_flash_write_is_denied() -> None:
     assert world.stored == OLD_RECORDS
 
 
-def test_an_upload_without_a_link_is_denied() -> None:
-    world, station = holding()
+def test_an_upload_without_a_link_is_denied(world: World, station: GroundStation) -> None:
     world.unplug()
     refused(world, station, 5, A.DENIED, "No link")
     for message in (count_message(0), clear_message()):
@@ -367,9 +353,8 @@ def test_an_upload_without_a_link_is_denied() -> None:
         assert acks(station) == [A.DENIED]
 
 
-def test_a_write_fast_with_lost_items_is_reported_repeatedly() -> None:
+def test_a_write_fast_with_lost_items_is_reported_repeatedly(world: World, station: GroundStation) -> None:
     """Mission Planner reports success regardless and ends with its own MISSION_ACK."""
-    world, station = holding()
     other = GroundStation(world, "other", sysid=254)
     items = waypoints(35)
     station.stay_connected()
@@ -446,8 +431,7 @@ def test_a_count_of_0_cancels_but_does_not_clear(
     assert world.stored == ()
 
 
-def test_a_new_count_clears_the_previous_refusal() -> None:
-    world, station = holding()
+def test_a_new_count_clears_the_previous_refusal(world: World, station: GroundStation) -> None:
     refused(world, station, 147, A.NO_SPACE, "only 146 fit")
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
     station.ask(item_message(1, OLD[1]), wait_s=0.1)
@@ -458,8 +442,7 @@ def test_a_new_count_clears_the_previous_refusal() -> None:
 
 
 @pytest.mark.parametrize("as_int", [True, False])
-def test_each_item_is_requested_once_with_mission_request(as_int: bool) -> None:
-    world, station = holding()
+def test_each_item_is_requested_once_with_mission_request(world: World, station: GroundStation, as_int: bool) -> None:
     items = waypoints(146)
     stored_at_ack = listen_for_acks(world, station)
     assert Upload(station, items, as_int=as_int).run() is A.ACCEPTED
@@ -509,9 +492,8 @@ def test_the_timeout_adapts_to_the_round_trip(round_trip_s: float, copies: int) 
     assert max(counts[4:]) == {1.0: 2, 2.0: 3}.get(round_trip_s, 1)
 
 
-def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
+def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up(world: World, station: GroundStation) -> None:
     """It waits 2.5 s for the next request."""
-    world, station = holding()
     station.radio = Radio(delay_s=0.2)
     items = waypoints(8)
     asked: dict[int, list[float]] = {seq: [] for seq in range(8)}
@@ -530,8 +512,7 @@ def test_four_copies_of_a_lost_request_arrive_before_mavsdk_gives_up() -> None:
 
 
 @pytest.mark.parametrize("late_s", [0.1, 2.0])
-def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> None:
-    world, station = holding()
+def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(world: World, station: GroundStation, late_s: float) -> None:
     items = waypoints(8)
     items[5] = replace(items[5], command=21)  # LAND must be last
     receiving(world, station, items, 6)
@@ -543,8 +524,7 @@ def test_a_cancel_that_crosses_a_refusal_keeps_the_mission(late_s: float) -> Non
     assert world.stored == OLD_RECORDS
 
 
-def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
-    world, station = holding()
+def test_a_repeated_count_of_0_does_not_cancel_the_clear(world: World, station: GroundStation) -> None:
     hanging_push(world)
     world.run(1)
     for _ in range(3):
@@ -555,8 +535,7 @@ def test_a_repeated_count_of_0_does_not_cancel_the_clear() -> None:
     assert world.stored == ()
 
 
-def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:
-    world, station = holding()
+def test_a_list_that_breaks_a_rule_is_refused_at_once(world: World, station: GroundStation) -> None:
     items = waypoints(30)
     items[12] = replace(items[12], command=21)  # LAND must be last
     upload = Upload(station, items)
@@ -568,8 +547,7 @@ def test_a_list_that_breaks_a_rule_is_refused_at_once() -> None:
     assert world.store.outcomes() == [Outcome.REJECTED]
 
 
-def test_the_summary_comes_last_and_goes_only_to_the_writer() -> None:
-    world, station = holding()
+def test_the_summary_comes_last_and_goes_only_to_the_writer(world: World, station: GroundStation) -> None:
     other = GroundStation(world, "other", sysid=254)
     other.send(ack_message(A.ACCEPTED))
     items = waypoints(40)
@@ -587,9 +565,8 @@ def test_the_summary_comes_last_and_goes_only_to_the_writer() -> None:
     assert [text.text for text in other.messages("STATUSTEXT")] == ["New mission, 20 items, by gcs"]
 
 
-def test_changes_that_cannot_matter_are_not_spoken() -> None:
+def test_changes_that_cannot_matter_are_not_spoken(world: World, station: GroundStation) -> None:
     """QGroundControl speaks NOTICE; its take-off has coordinates, and home a height of 0 without terrain data."""
-    world, station = holding()
     home, first, *rest = waypoints(6)
     items = [replace(home, alt_m=0.0), replace(first, command=Command.NAV_TAKEOFF, p2=0.0, alt_m=10.0), *rest]
     screen = Screens(station).qgc
@@ -615,8 +592,7 @@ def test_the_flight_controller_is_lost_during_the_write(lose: Callable[[World], 
     assert Upload(station, waypoints(30)).run() is A.ACCEPTED
 
 
-def test_the_flight_controller_is_lost_while_it_is_asked() -> None:
-    world, station = holding()
+def test_the_flight_controller_is_lost_while_it_is_asked(world: World, station: GroundStation) -> None:
     station.send(count_message(5), wait_s=0.0005)
     assert state(world) is Asking
     world.unplug()
@@ -663,9 +639,8 @@ def test_late_wake_ups_do_not_lose_items(late_s: float) -> None:
         world.assert_line_was_clean()
 
 
-def test_a_flood_of_requests_does_not_fill_queues() -> None:
+def test_a_flood_of_requests_does_not_fill_queues(world: World, station: GroundStation) -> None:
     """The world checks the queue of conversations; the other queues are checked here."""
-    world, station = holding()
     for number in range(3000):
         station.send(count_message(5 + number % 90))
         station.send(item_message(0, OLD[0]))

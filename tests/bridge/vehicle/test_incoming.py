@@ -82,9 +82,10 @@ def signing() -> Signing:
     return Signing(KEY, Timestamps(lambda: NOON))
 
 
-def keyed(given: Signing | None = None) -> World:
+@pytest.fixture
+def world() -> World:
     """A world whose only link requires a key."""
-    return ready_world(links={"udp": LinkAccess(given or signing(), LINK_ID)})
+    return ready_world(links={"udp": LinkAccess(signing(), LINK_ID)})
 
 
 def signing_station(world: World, name: str = "gcs", *, at: int = ticks(NOON), sysid: int = 255) -> GroundStation:
@@ -114,8 +115,7 @@ def refusals(world: World) -> dict[str, int]:
 
 @pytest.mark.parametrize(("message", "answer"), WRITES, ids=named)
 @pytest.mark.parametrize("version", [1, 2])
-def test_messages_that_change_something_must_be_signed(message: Message, answer: str | None, version: int) -> None:
-    world = keyed()
+def test_a_change_must_be_signed(world: World, message: Message, answer: str | None, version: int) -> None:
     station = GroundStation(world, version=version)
     station.send(message, wait_s=0.01)
     assert refusals(world) == {"not signed": 1}
@@ -137,15 +137,13 @@ def test_messages_that_change_something_must_be_signed(message: Message, answer:
 
 @pytest.mark.parametrize("message", READS, ids=named)
 @pytest.mark.parametrize("version", [1, 2])
-def test_reading_does_not_need_a_signature(message: Message, version: int) -> None:
-    world = keyed()
+def test_reading_does_not_need_a_signature(world: World, message: Message, version: int) -> None:
     GroundStation(world, version=version).send(message)
     world.run(0.5)
     assert refusals(world) == {}
 
 
-def test_every_message_not_known_to_be_harmless_must_be_signed() -> None:
-    world = keyed()
+def test_every_message_not_known_to_be_harmless_must_be_signed(world: World) -> None:
     station = GroundStation(world)
     free = {message.get_msgId() for message in READS} - {mavlink.MAVLINK_MSG_ID_COMMAND_LONG} | {
         mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
@@ -165,8 +163,7 @@ def test_every_message_not_known_to_be_harmless_must_be_signed() -> None:
     assert sum(refusals(world).values()) == len(CRC_EXTRA) - len(free)
 
 
-def test_a_signed_upload_is_accepted_and_every_reply_is_signed() -> None:
-    world = keyed()
+def test_a_signed_upload_is_accepted_and_every_reply_is_signed(world: World) -> None:
     station = signing_station(world)
     items = waypoints(8)
     assert Upload(station, items).run() is MissionResult.ACCEPTED
@@ -184,8 +181,7 @@ def test_a_signed_upload_is_accepted_and_every_reply_is_signed() -> None:
         assert message.get_link_id() == LINK_ID
 
 
-def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
-    world = keyed()
+def test_mavlink_1_and_unheard_peers_get_only_signed_frames(world: World) -> None:
     unheard = GroundStation(world, "unheard")
     world.bridge.add_default_peer(unheard.peer, until_answered=False)
     old = GroundStation(world, "old", version=1)
@@ -195,8 +191,7 @@ def test_mavlink_1_and_unheard_peers_get_only_signed_frames() -> None:
         assert all(frame[0] == 0xFD and frame[2] & 1 for frame in station.frames)
 
 
-def test_without_the_key_an_upload_is_refused() -> None:
-    world = keyed()
+def test_without_the_key_an_upload_is_refused(world: World) -> None:
     station = GroundStation(world)
     station.sign(OTHER_KEY, ticks(NOON))
     assert Upload(station, waypoints(5)).run() is MissionResult.DENIED
@@ -204,8 +199,7 @@ def test_without_the_key_an_upload_is_refused() -> None:
     assert set(refusals(world)) == {Check.WRONG.value}
 
 
-def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
-    world = keyed()
+def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time(world: World) -> None:
     stations = [GroundStation(world, name) for name in ("one", "two")]
     for _ in range(5):
         for station in stations:
@@ -222,8 +216,7 @@ def test_a_refusal_is_logged_once_for_each_peer_and_counted_each_time() -> None:
 
 
 @pytest.mark.parametrize("was_right", [False, True])
-def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
-    world = keyed()
+def test_a_station_gets_a_text_about_a_wrong_clock(world: World, *, was_right: bool) -> None:
     station, right = signing_station(world), signing_station(world, "right clock", sysid=254)
     if was_right:
         station.send(clear_message(), wait_s=1)
@@ -239,9 +232,8 @@ def test_a_station_gets_a_text_about_a_wrong_clock(*, was_right: bool) -> None:
     assert [ack.type for ack in right.messages("MISSION_ACK")] == [MissionResult.ACCEPTED]
 
 
-def test_a_refusal_of_rates_is_silent() -> None:
+def test_a_refusal_of_rates_is_silent(world: World) -> None:
     """Every ground station sends some when it connects, and every radio its status."""
-    world = keyed()
     station = GroundStation(world)
     station.send(mavlink.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0))
     station.send(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
@@ -264,8 +256,7 @@ def test_texts_for_others_do_not_reach_a_listener(access: LinkAccess) -> None:
     assert (pilot.texts(), listener.texts()) == (["Found INAV"], [])
 
 
-def test_listeners_do_not_displace_a_station_with_the_key() -> None:
-    world = keyed()
+def test_listeners_do_not_displace_a_station_with_the_key(world: World) -> None:
     pilot = signing_station(world, "pilot")
     for number in range(40):
         if number == 20:
@@ -279,8 +270,7 @@ def test_listeners_do_not_displace_a_station_with_the_key() -> None:
     assert len(peers) <= 32
 
 
-def test_an_address_must_show_the_key_again_after_the_station_has_left() -> None:
-    world = keyed()
+def test_an_address_must_show_the_key_again_after_the_station_has_left(world: World) -> None:
     station, another = signing_station(world), GroundStation(world, sysid=250)
     assert another.peer == station.peer
     for times in (1, 2):
@@ -291,8 +281,7 @@ def test_an_address_must_show_the_key_again_after_the_station_has_left() -> None
         world.bridge.gcs_gone(station.peer, world.now)
 
 
-def test_a_replayed_frame_is_refused() -> None:
-    world = keyed()
+def test_a_replayed_frame_is_refused(world: World) -> None:
     station = signing_station(world)
     frame = station.pack(clear_message())
     world.receive_from(station, frame)
@@ -309,9 +298,8 @@ def test_a_replayed_frame_is_refused() -> None:
     assert len(station.messages("MISSION_ACK")) == 1
 
 
-def test_an_unsigned_frame_cannot_end_the_pilots_upload() -> None:
+def test_an_unsigned_frame_cannot_end_the_pilots_upload(world: World) -> None:
     """The attacker can forge the address and ids, but not the signature."""
-    world = keyed()
     station = signing_station(world)
     forger = GroundStation(world, "gcs")
     world.stations[station.peer] = station

@@ -8,7 +8,7 @@ from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from bridge.voice.stations import BadNews, Behaviour, Kind
 from protocols.mavlink.dialect import Message
-from tests.support.world import GroundStation, ready_world
+from tests.support.world import GroundStation, World
 
 MISSING = sentences.ITEMS_MISSING(3, 35)
 ARMED = sentences.ARMED()
@@ -94,9 +94,8 @@ def test_a_refusal_of_a_routine_request_does_not_silence_the_pilots() -> None:
     assert news.is_repeated(ARMED, 0.2, is_routine=True)
 
 
-def test_a_lost_text_reaches_mission_planner_later() -> None:
+def test_a_lost_text_reaches_mission_planner_later(world: World) -> None:
     """Write Fast, and both its closing ack and the first text are lost: it has shown a success."""
-    world = ready_world()
     station = GroundStation(world).stay_connected()
     station.send(m.MAVLink_request_data_stream_message(1, 1, m.MAV_DATA_STREAM_ALL, 2, 1), wait_s=2)
     station.send(m.MAVLink_mission_count_message(1, 1, 5))
