@@ -18,6 +18,5 @@ def flying() -> tuple[World, GroundStation]:
     world.run(7)
     station = GroundStation(world)
     # A new station gets HOME_POSITION within a second: that is not a reply.
-    station.stay_connected()
-    world.run(1.2)
+    station.stay_connected(wait_s=1.2)
     return world, station

@@ -538,9 +538,10 @@ class GroundStation:
         self.send(message, wait_s=wait_s)
         return self.messages()
 
-    def stay_connected(self) -> "GroundStation":
+    def stay_connected(self, *, wait_s: float = 0.0) -> "GroundStation":
         """Send a heartbeat each second from now on."""
         self._beat()
+        self.world.run(wait_s)
         return self
 
     def _beat(self) -> None:

@@ -108,8 +108,7 @@ def flying(protocol: TelemetryProtocol, boxes: int = BARO_AND_ANGLE) -> tuple[Wo
     faults = Faults(boxes=boxes)
     world = World(SimOptions(tele_prot=protocol), faults)
     world.wait_ready()
-    station = GroundStation(world).stay_connected()
-    world.run(3)
+    station = GroundStation(world).stay_connected(wait_s=3)
     faults.armed = True
     world.run(30)
     return world, station, Screens(station)

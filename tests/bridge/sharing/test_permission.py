@@ -119,8 +119,7 @@ def test_a_refused_write_is_not_a_warning(is_armed: bool) -> None:
     world = ready("harakiri")
     if is_armed:
         arm(world)
-    station = GroundStation(world).stay_connected()
-    world.run(2)
+    station = GroundStation(world).stay_connected(wait_s=2)
     ShareProgram(world).ask(202, bytes(30), wait_s=1)
     texts = [message for message in station.messages("STATUSTEXT") if "SET_PID refused" in message.text]
     assert [message.severity for message in texts] == [5], "MAV_SEVERITY_NOTICE"

@@ -31,8 +31,7 @@ class CalibrationPages:
     def __init__(self, peer: Any = None, faults: Faults | None = None) -> None:
         self.world = ready_world(SimOptions(), faults, peer=peer)
         self.station = GroundStation(self.world)
-        self.station.stay_connected()
-        self.world.run(4)
+        self.station.stay_connected(wait_s=4)
         self.screens = Screens(self.station)
         self.began_at = self.world.now
         self.station.take()

@@ -32,8 +32,7 @@ def test_near_the_poles_the_declination_is_unknown() -> None:
 
 def compass_texts(world: World, name: str) -> list[str]:
     """What a station that connects now is told about the compass."""
-    station = GroundStation(world, name).stay_connected()
-    world.run(5)
+    station = GroundStation(world, name).stay_connected(wait_s=5)
     return [text for text in station.texts() if "Compass" in text]
 
 

@@ -117,8 +117,7 @@ def flight() -> Flight:
 
 
 def test_the_craft_flies_to_the_item_and_continues(flight: Flight) -> None:
-    other = GroundStation(flight.world, "other", sysid=254).stay_connected()
-    flight.world.run(1)
+    other = GroundStation(flight.world, "other", sysid=254).stay_connected(wait_s=1)
     flight.station.received.clear()
     flight.ask(set_current(3))
     assert flight.number == 3
