@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bridge whose board holds a list, and a ground station that writes another one message by message."""
 
+from collections.abc import Sequence
+
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
 from bridge.line.conversation import Conversation, Pause
@@ -8,7 +10,7 @@ from bridge.transfers.upload_states import Receiving, UploadState
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionItem, MissionResult
 from simulator.board.options import Faults, SimOptions
-from tests.support.conversations import count_message, item_message, records_of, waypoints
+from tests.support.conversations import Upload, count_message, item_message, records_of, waypoints
 from tests.support.world import GroundStation, World, flash_holding, ready_world
 
 OLD = waypoints(20, seed=77)
@@ -55,6 +57,12 @@ def finish(world: World, station: GroundStation, items: list[MissionItem], sent:
     world.run(1)
     assert acks(station) == [*before, A.ACCEPTED]
     assert world.stored == records_of(items)
+
+
+def assert_written(station: GroundStation, items: Sequence[MissionItem]) -> None:
+    """The station's upload is accepted, and the board holds the items."""
+    assert Upload(station, items).run() is A.ACCEPTED
+    assert station.world.stored == records_of(items)
 
 
 def acks(station: GroundStation) -> list[MissionResult]:

@@ -10,6 +10,7 @@ from bridge.gcs.rights import LinkAccess
 from protocols.mavlink.dialect import Message
 from protocols.mission_item import MissionResult
 from tests.support.conversations import Download, Upload, item_message, records_of, waypoints
+from tests.support.upload_bench import assert_written
 from tests.support.world import GroundStation, Radio, World, ready_world
 
 m = messages
@@ -112,8 +113,7 @@ def test_an_upload_restarted_from_a_new_address_replaces_the_old_upload() -> Non
         roamer.move()
         world.run(1.5)
         plan = waypoints(count, seed=7)
-        assert Upload(roamer.station, plan).run() is MissionResult.ACCEPTED
-        assert world.stored == records_of(plan)
+        assert_written(roamer.station, plan)
 
 
 def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list(world: World) -> None:
@@ -125,8 +125,7 @@ def test_a_restarted_station_is_not_asked_for_items_of_the_previous_list(world: 
     roamer.move()
     world.run(3)
     assert roamer.station.messages("MISSION_REQUEST") == []
-    assert Upload(roamer.station, PLAN).run() is MissionResult.ACCEPTED
-    assert world.stored == records_of(PLAN)
+    assert_written(roamer.station, PLAN)
 
 
 def test_the_result_of_an_upload_goes_to_the_new_address(world: World) -> None:

@@ -34,6 +34,7 @@ from tests.support.upload_bench import (
     A,
     acks,
     assert_refusal_is_repeated,
+    assert_written,
     begun,
     finish,
     hanging_push,
@@ -160,11 +161,7 @@ def test_a_slow_upload_does_not_delay_others() -> None:
         world.after(4.9 * (seq + 1), lambda seq=seq: slow.send(item_message(seq, waypoints(4, 1)[seq])))  # type: ignore[misc]
     world.run(2)
     for number in range(3):
-        plan = waypoints(30, number)
-        assert (
-            Upload(GroundStation(world, f"{number}", sysid=number + 1), plan, repeat_s=0.7, tries=4).run() is A.ACCEPTED
-        )
-        assert world.stored == records_of(plan)
+        assert_written(GroundStation(world, f"{number}", sysid=number + 1), waypoints(30, number))
     world.run(20)
     assert acks(slow) == [A.ACCEPTED]
     assert world.stored == records_of(waypoints(4, 1))
@@ -245,8 +242,7 @@ def test_a_waiting_upload_can_be_cancelled(world: World, station: GroundStation,
 def test_the_same_station_restarts_while_items_arrive(sent: int, count: int) -> None:
     world, station = begun(waypoints(30, 1), sent)
     again = waypoints(count, 2)
-    assert Upload(station, again).run() is A.ACCEPTED
-    assert world.stored == records_of(again)
+    assert_written(station, again)
     ends = world.events("mission.refused") + world.events("mission.upload_ended")
     assert len(ends) == len(world.events("mission.upload_started"))
 
@@ -298,9 +294,7 @@ def test_the_same_station_restarts_while_the_list_is_written(after_s: float) -> 
     world, station = begun(first, 146)
     world.run(after_s)
     assert state(world) is Delivering
-    upload = Upload(station, again)
-    assert upload.run() is A.ACCEPTED
-    assert world.stored == records_of(again)
+    assert_written(station, again)
     assert world.store.outcomes() == [Outcome.VERIFIED, Outcome.VERIFIED]
     assert state(world) is None
 
@@ -310,8 +304,7 @@ def test_a_list_takes_the_place_of_a_waiting_clear(world: World, station: Ground
     other = GroundStation(world, "other", sysid=254)
     receiving(world, other, waypoints(30, 1), 30)
     station.send(clear_message(255))
-    assert Upload(station, waypoints(5)).run() is A.ACCEPTED
-    assert world.stored == records_of(waypoints(5))
+    assert_written(station, waypoints(5))
 
 
 @pytest.mark.parametrize("announce", [count_message(0), clear_message(), count_message(12)])
@@ -324,18 +317,14 @@ def test_a_new_count_suppresses_the_ack_of_the_previous_list(announce: Message) 
     assert acks(station) == ([] if announce.get_type() == "MISSION_COUNT" and announce.count else [A.ACCEPTED])
 
 
-def busy_for(world: World, seconds: float) -> None:
-    world.faults.busy = True
-    world.after(seconds, lambda: setattr(world.faults, "busy", False))
-
-
 def test_an_upload_waits_for_a_flash_write(world: World, station: GroundStation) -> None:
-    busy_for(world, 0.7)
+    world.faults.busy = True
+    world.after(0.7, lambda: setattr(world.faults, "busy", False))
     assert Upload(station, waypoints(5)).run() is A.ACCEPTED
 
 
 def test_an_upload_during_a_long_flash_write_is_denied(world: World, station: GroundStation) -> None:
-    busy_for(world, 3)
+    world.faults.busy = True
     began = world.now
     station.send(count_message(5))
     world.wait_until(lambda _: bool(acks(station)), 3)
@@ -605,8 +594,7 @@ def test_a_failing_or_slow_store_does_not_prevent_an_upload(failing: bool) -> No
     world, station = holding()
     world.store.failing = failing
     world.store.delay_s = 0.7
-    assert Upload(station, waypoints(20)).run() is A.ACCEPTED
-    assert world.stored == records_of(waypoints(20))
+    assert_written(station, waypoints(20))
     world.run(0.1)
     assert ("The mission could not be stored on the Pi" in station.texts()) is failing
 
