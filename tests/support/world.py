@@ -533,7 +533,7 @@ class GroundStation:
         self.world.run(wait_s)
 
     def ask(self, message: Message, *, wait_s: float = 0.0) -> list[Message]:
-        """Forget what was received, and send a message; what comes in the meantime."""
+        """Forget earlier messages and send one; the messages received meanwhile."""
         self.take()
         self.send(message, wait_s=wait_s)
         return self.messages()
