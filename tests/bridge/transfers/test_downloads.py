@@ -287,7 +287,8 @@ def test_another_boards_mission_is_not_served() -> None:
     """The port was opened again, and the board on it speaks no MSP."""
     world, _ = disarmed(TelemetryProtocol.MAVLINK)
     world.unplug()
-    world.arm(then_s=3)
+    world.faults.armed = True
+    world.run(3)
     world.plug()
     arm(world)
     station = GroundStation(world)
