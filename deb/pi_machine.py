@@ -201,12 +201,11 @@ class _Wire(threading.Thread):
     QEMU's UARTs carry bytes without a speed, but its trace has the speeds of the PL011.
     """
 
-    def __init__(self, path: Path, board: Path, trace: Path, speeds: list[int]) -> None:
+    def __init__(self, pins: socket.socket, board: Path, trace: Path, speeds: list[int]) -> None:
         super().__init__(daemon=True)
         self._board = os.open(board, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(self._board)
-        self._pi = socket.socket(socket.AF_UNIX)
-        self._pi.connect(str(path))
+        self._pi = pins
         self._trace = trace.open("rb")
         self._speeds = speeds
 
@@ -243,8 +242,6 @@ class Pi:
         self._folder, self._board = folder, board
         self._qemu: subprocess.Popen[bytes] | None = None
         self._card: Card
-        #: The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
-        self.clock: tuple[str, ...] = ("-icount", "shift=1")
         self.ports = {"ssh": 0, "gcs": 0, "page": 0}
         self.speeds: list[int] = []
         files = CACHE / "bare"
@@ -287,7 +284,8 @@ class Pi:
         self._qemu = subprocess.Popen(
             [
                 *("qemu-system-aarch64", "-M", "raspi3b", "-display", "none", "-no-reboot", "-monitor", "none"),
-                *self.clock,
+                # The Pi's time follows its instructions: on a busy machine it becomes slow, but no timeout comes early.
+                *("-icount", "shift=1"),
                 *("-kernel", self._kernel, "-initrd", self._initrd, "-dtb", tree, "-append", words),
                 *("-drive", f"if=sd,format=raw,file={card.image}"),
                 *("-chardev", f"socket,id=header,path={pins},server=on,wait=off"),
@@ -305,12 +303,13 @@ class Pi:
         )
         with suppress(OSError):  # of Linux's automatic groups of processes, where `nice` has no effect between sessions
             Path(f"/proc/{self._qemu.pid}/autogroup").write_text("10")
-        while not pins.exists():
+        wire = socket.socket(socket.AF_UNIX)
+        while wire.connect_ex(str(pins)):
             if self._qemu.poll() is not None:
                 raise TrialError(f"QEMU did not start: see {log.name}")
             time.sleep(0.05)
         self.speeds = []
-        _Wire(pins, self._board, trace, self.speeds).start()
+        _Wire(wire, self._board, trace, self.speeds).start()
 
     def is_off(self) -> bool:
         return self._qemu is None or self._qemu.poll() is not None
