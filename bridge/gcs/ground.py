@@ -247,8 +247,6 @@ class Ground:
                 return new.senders[ids]
         return sender
 
-    # Messages to all stations.
-
     def broadcast(self, message: Message) -> None:
         self.outbox.multicast(pack(message), self.everyone)
 

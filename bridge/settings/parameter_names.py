@@ -7,6 +7,7 @@ parameters stay valid. docs/ground-stations.md has the rule.
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from functools import lru_cache
 from zlib import crc32
 
 LONGEST = 16
@@ -34,6 +35,7 @@ def parameter_names(settings: Iterable[str], taken: Collection[str] = ()) -> Map
     return {distinct[name] if often[parameter] > 1 else parameter: name for name, parameter in short.items()}
 
 
+@lru_cache(2048)  # for each reading of a board's several hundred settings
 def _short(name: str) -> str:
     """Abbreviate words, drop the vowels inside words, last word first, and cut the longest words, until it is short."""
     if len(name) <= LONGEST:

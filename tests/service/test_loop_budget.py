@@ -164,7 +164,7 @@ def work_of(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Stor
         yield work_of
 
 
-@pytest.mark.parametrize("door", [zenoh, control_socket, page, share, udp, tcp])
+@pytest.mark.parametrize("door", [control_socket, page, udp, tcp, share, zenoh])
 def test_the_worst_requests_of_a_door_stay_within_the_loops_budget(
     door: Story, work_of: Callable[[Story], Work]
 ) -> None:
