@@ -55,11 +55,11 @@ def build(architecture: str, pythons: Sequence[str] = PYTHONS, folder: Path = _D
     libraries = {}
     for python in pythons:
         fetch(architecture, python, wheels)
-        target = _target(python, _MACHINES[architecture])
+        machine = target(python, _MACHINES[architecture])
         # Only from the wheels, whose hashes were just checked. Build tools are left out.
         libraries[python] = work / python
         from_wheels = ("--no-index", "--find-links", wheels, "--no-compile", "--target", libraries[python])
-        _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *target, f"naze-bridge=={version}")
+        _run(*_PIP, "install", "--no-warn-conflicts", *from_wheels, *machine, f"naze-bridge=={version}")
     root = work / "root"
     lay_out(root, work / "sim", libraries, _PROJECT, debian_version(version), architecture)
     folder.mkdir(exist_ok=True)
@@ -96,7 +96,7 @@ def fetch(architecture: str, python: str, wheels: Path) -> None:
     if not any(wheels.glob("pymavlink-*")):
         _fetch_pymavlink(wheels)
     for lock in _locks(architecture, wheels):
-        _download(lock, wheels, *_target(python, _MACHINES[architecture]))
+        _download(lock, wheels, *target(python, _MACHINES[architecture]))
 
 
 def _download(lock: Path, folder: Path, *target: str) -> None:
@@ -108,7 +108,7 @@ def _fetch_pymavlink(wheels: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         lock = Path(name) / "pymavlink.lock"
         lock.write_text(next(text for text, package, _ in _pinned() if package == "pymavlink"))
-        _download(lock, Path(name), *_target(PYTHONS[0], "x86_64"))
+        _download(lock, Path(name), *target(PYTHONS[0], "x86_64"))
         (whole,) = Path(name).glob("*.whl")
         package = "-".join(whole.name.split("-")[:2])
         with zipfile.ZipFile(whole) as source, zipfile.ZipFile(wheels / f"{package}-py3-none-any.whl", "w") as used:
@@ -142,7 +142,8 @@ def _pin(name: str, version: str) -> str:
     return f"{re.sub('[-_.]+', '-', name).lower()}=={version}"
 
 
-def _target(python: str, machine: str) -> list[str]:
+def target(python: str, machine: str) -> list[str]:
+    """The options of pip for the wheels of another machine, such as "aarch64"."""
     platforms = [word for libc in _GLIBC for word in ("--platform", f"{libc}_{machine}")]
     return ["--only-binary=:all:", "--python-version", python, *platforms]
 

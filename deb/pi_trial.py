@@ -35,12 +35,14 @@ from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from http.client import HTTPException
+from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
 
+from deb.build import target
 from deb.pi_machine import BOOT_FILES, CACHE, NEWER, NEWER_PACKAGE, PROJECT, Card, Pi, TrialError, make_roots, run
 from payloads.mission_data import mission_items
 from protocols.mission_item import MissionItem, MissionResult
@@ -274,15 +276,15 @@ def updates(pi: Pi, plug: Plug, pulls: int) -> None:
     token, package = token_of(pi), NEWER_PACKAGE.read_bytes()
     for start in range(0, len(package), _PIECE):
         fetch(pi, f"/api/pi/package?start={start}", token, package[start : start + _PIECE])
-    for action, version in (("install", NEWER), ("downgrade", "0.")):
+    for action, wanted in (("install", NEWER), ("downgrade", "0.")):
         said = ask_page(pi, token, {"action": action})
-        check(said["version"].startswith(version), f"the page announces another version: {said}")
+        check(said["version"].startswith(wanted), f"the page announces another version: {said}")
         for _ in range(pulls // 2):
             time.sleep(plug.chance.uniform(0, 40))
-            plug.pull(partial(replace, plug.done, act=f"update to {version}"))
-        pi.until(f"grep '^Version {version}.* was installed' /var/lib/naze-bridge-helper/outcome", 3600)
+            plug.pull(partial(replace, plug.done, act=f"update to {wanted}"))
+        pi.until(f"grep '^Version {wanted}.* was installed' /var/lib/naze-bridge-helper/outcome", 3600)
         found = pi.run("dpkg-query --showformat '${Version}' --show naze-bridge")
-        check(found.startswith(version), f"version {found} instead of {version}")
+        check(found.startswith(wanted), f"version {found} instead of {wanted}")
         pi.until(_HAS_BOARD)
         mark = max(plug.done.marks) + 1
         with station(pi) as gcs:
@@ -443,6 +445,35 @@ def leaves_the_mini_uart(pi: Pi, naze: Naze) -> None:
     pi.until(_HAS_BOARD)
 
 
+#: Fetched for the Pi, in the versions that run here. The package has what they need besides.
+_TEST_LIBRARIES = (
+    *("pytest", "pytest-asyncio", "pytest-timeout", "iniconfig", "packaging", "pluggy"),
+    *("hypothesis", "sortedcontainers", "pymavlink"),
+)
+#: Without the flight's: they compile C.
+_TESTS = "tests/storage tests/bridge --ignore tests/bridge/controllers/harakiri/test_flight.py"
+_PYTHON = "/usr/lib/naze-bridge/bin/python3"
+
+
+def runs_the_tests(pi: Pi, _naze: Naze) -> None:
+    """The demo, and the tests of the store and the bridge, pass on arm64 as a normal user."""
+    pi.cut()
+    card = Card.written(CACHE / "work" / "tests.img", CACHE / "ready", BOOT_FILES)
+    with card.mounted() as root:
+        home = root / "home/pilot"
+        run("git", "clone", "--quiet", "--depth=1", f"file://{PROJECT}", home / "naze-bridge")
+        pinned = [f"{name}=={version(name)}" for name in _TEST_LIBRARIES]
+        pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-compile")
+        run(*pip, *target("3.11", "aarch64"), "--target", home / "libraries", *pinned)
+        run("chroot", root, "chown", "-R", "pilot:", "/home/pilot")
+    pi.start(card)
+    pi.run("systemctl stop naze-bridge")
+    say(pi.run("su - pilot -c 'naze-bridge demo --once'").splitlines()[-1])
+    with_libraries = f"cd naze-bridge && PYTHONPATH=~/libraries {_PYTHON} -m pytest"
+    said = pi.run(f"su - pilot -c '{with_libraries} -q -p no:cacheprovider --timeout 0 {_TESTS}'")
+    say(said.splitlines()[-1])
+
+
 def opens_a_hotspot(pi: Pi, _naze: Naze) -> None:
     """Setup opens a hotspot. A phone joins it by another radio, and is led to the status page."""
     pi.run(f"echo {_PASSWORD} >/root/password")
@@ -529,7 +560,7 @@ def main() -> None:
         (start_again, (pi, plug)),
         *((part, (pi, naze)) for part in (starts_by_firstrun, starts_by_cloud_init)),
         (repeats_a_cut_start, (pi, plug)),
-        (leaves_the_mini_uart, (pi, naze)),
+        *((part, (pi, naze)) for part in (leaves_the_mini_uart, runs_the_tests)),
     ]
     try:
         for part, words in parts:
