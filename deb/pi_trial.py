@@ -41,6 +41,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
+from urllib.error import HTTPError
 
 from deb.build import target
 from deb.pi_machine import BOOT_FILES, CACHE, NEWER, NEWER_PACKAGE, PROJECT, Card, Pi, TrialError, make_roots, run
@@ -524,11 +525,18 @@ def ask_page(pi: Pi, token: str, request: object) -> Any:
 
 
 def fetch(pi: Pi, path: str, token: str, body: bytes | None = None, kind: str = "application/octet-stream") -> Any:
-    """A request to the status page's API, from outside."""
+    """A request to the status page's API, from outside. Repeated while the daemon restarts for a saved setting."""
     headers = {"Authorization": f"Bearer {token}", "Content-Type": kind}
     request = urllib.request.Request(f"http://127.0.0.1:{pi.ports['page']}{path}", body, headers)
-    with urllib.request.urlopen(request, timeout=60) as reply:  # noqa: S310  # our own address
-        return json.load(reply)
+    end = time.monotonic() + 60
+    while True:
+        try:
+            with urllib.request.urlopen(request, timeout=60) as reply:  # noqa: S310  # our own address
+                return json.load(reply)
+        except (OSError, HTTPException) as error:
+            if isinstance(error, HTTPError) or time.monotonic() > end:
+                raise
+        time.sleep(1)
 
 
 def main() -> None:
