@@ -5,6 +5,8 @@ import random
 from functools import lru_cache
 
 _FRAME_BITS = 10
+#: The levels of each byte's frame on the wire.
+_FRAMES = tuple(bytes((0, *(byte >> shift & 1 for shift in range(8)), 1)) for byte in range(256))
 
 
 # A search for the speed sends the same few frames again and again.
@@ -20,17 +22,19 @@ def garble(data: bytes, sent_baud: int, read_baud: int) -> bytes:
         return data
     if not (sent_baud and read_baud):
         return b""
-    wire = bytes(bit for byte in data for bit in (0, *(byte >> shift & 1 for shift in range(8)), 1))
     sent_bits_per_read = sent_baud / read_baud
+    first, *offsets = ((index + 0.5) * sent_bits_per_read for index in range(1, _FRAME_BITS))
+    # The idle line is high.
+    wire = b"".join([_FRAMES[byte] for byte in data]) + b"\1" * int(_FRAME_BITS * sent_bits_per_read + 1)
     received = bytearray()
     edge = wire.find(0)
     while edge >= 0:
-        # The idle line is high.
-        samples = (int(edge + (index + 0.5) * sent_bits_per_read) for index in range(_FRAME_BITS))
-        _, *bits, stop = (wire[at] if at < len(wire) else 1 for at in samples)
-        received.append(sum(bit << shift for shift, bit in enumerate(bits)))
-        after = int(edge + (_FRAME_BITS - 0.5) * sent_bits_per_read)
-        if not stop:
+        bits = wire[int(edge + first)]
+        for shift, offset in enumerate(offsets, 1):
+            bits |= wire[int(edge + offset)] << shift
+        received.append(bits & 0xFF)
+        after = int(edge + offsets[-1])
+        if not bits >> 8:
             after = wire.find(1, after)
         edge = wire.find(0, after) if after >= 0 else -1
     return bytes(received)
