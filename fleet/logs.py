@@ -14,7 +14,7 @@ from typing import Any
 import click
 import zenoh
 
-from fleet.options import address_options, fleet_session, json_option
+from fleet.options import address_options, fleet_session, json_option, vehicle_option
 from fleet.payload import part, text, whole
 from fleet.roll_call import alive, chosen
 from fleet.session import NO_COMMANDS, FleetError, answer_of, ask_each
@@ -32,8 +32,9 @@ _MOST_BYTES = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """A log on the vehicle; `size` in bytes."""
+    """A log on a vehicle; `size` in bytes."""
 
+    vehicle: str
     name: str
     size: int
 
@@ -43,13 +44,12 @@ def list_logs(session: zenoh.Session, prefix: str, vehicle: str) -> list[Log]:
     result = _ask(session, prefix, vehicle, LOG_LIST, None)
     found = part(result, "logs")
     logs = [(text(each, "name"), whole(each, "size")) for each in found if isinstance(each, dict)] if found else []
-    return [Log(name, size) for name, size in logs if name is not None and size is not None]
+    return [Log(vehicle, name, size) for name, size in logs if name is not None and size is not None]
 
 
 def fetch_log(
     session: zenoh.Session,
     prefix: str,
-    vehicle: str,
     log: Log,
     path: Path,
     rate_b_s: float,
@@ -57,17 +57,18 @@ def fetch_log(
 ) -> None:
     """Fetch a log into `path`, at most `rate_b_s` bytes a second over the link; FleetError, OSError.
 
-    Until it is whole it is called NAME.part. A fetch continues at the end of that file. `show` gets the size.
+    Until it is whole it is called NAME.part, and a fetch continues there. `show` gets the size of each piece.
     """
     partial = path.with_name(f"{path.name}.part")
     with partial.open("ab") as file:
+        show(file.tell())
         while file.tell() < log.size:
             began_at = time.monotonic()
             request = json.dumps({"name": log.name, "start": file.tell()}).encode()
-            piece, cost = _piece(_ask(session, prefix, vehicle, LOG_READ, request), file.tell())
+            piece, cost = _piece(_ask(session, prefix, log.vehicle, LOG_READ, request), file.tell())
             file.write(piece)
             file.flush()
-            show(file.tell())
+            show(len(piece))
             time.sleep(max(0.0, began_at + cost / rate_b_s - time.monotonic()))
     partial.rename(path)
 
@@ -94,48 +95,47 @@ def _ask(session: zenoh.Session, prefix: str, vehicle: str, key: ZenohKey, paylo
     raise FleetError(f"{vehicle} {NO_COMMANDS}")
 
 
-@click.command("logs", short_help="List and fetch a vehicle's telemetry logs.")
-@click.option("--vehicle", required=True, metavar="NAME", help="The vehicle.")
-@click.argument("names", metavar="[LOG]...", nargs=-1)
+@click.command("logs", short_help="List and fetch vehicles' telemetry logs.")
+@vehicle_option
+@click.argument("logs", metavar="[LOG]...", nargs=-1)
 @click.option("--folder", type=PATH, default=Path(), help="Folder to save them in; by default the current one.")
 @click.option(
     "--rate", type=click.FloatRange(1), default=20.0, show_default=True, help="The maximum rate over the link, kB/s."
 )
 @address_options
 @json_option
-def fleet_logs(vehicle: str, names: tuple[str, ...], folder: Path, rate: float, as_json: bool, **where: Any) -> None:
-    """List a vehicle's telemetry logs, or fetch those named.
+def fleet_logs(
+    names: tuple[str, ...], logs: tuple[str, ...], folder: Path, rate: float, as_json: bool, **where: Any
+) -> None:
+    """List the telemetry logs of all vehicles, or of those named, or fetch one vehicle's LOGs.
 
-    The vehicle must accept commands. A fetch that was interrupted continues where it stopped: run it again. Each log
+    The vehicles must accept commands. A fetch that was interrupted continues where it stopped: run it again. Each log
     becomes a file whose name begins with the vehicle's.
     """
+    if logs and len(names) != 1:
+        raise click.UsageError("logs are fetched from one vehicle: name it with one --vehicle")
     with fleet_session(where) as (session, prefix):
-        chosen(alive(session, prefix), (vehicle,), prefix)
-        logs = {log.name: log for log in list_logs(session, prefix, vehicle)}
-        for name in names:
-            if name not in logs or Path(name).name != name:
-                fail(f"{vehicle} has no log {name!r}: `naze-bridge fleet logs --vehicle {vehicle}` lists them")
+        meant = chosen(alive(session, prefix), names, prefix)
+        found = {name: list_logs(session, prefix, name) for name in meant}
+        known = {log.name: log for log in found[meant[0]]}
+        for name in logs:
+            if name not in known or Path(name).name != name:
+                fail(f"{meant[0]} has no log {name!r}: `naze-bridge fleet logs --vehicle {meant[0]}` lists them")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for name in names:
-                with click.progressbar(length=logs[name].size, label=name) as bar:
-                    fetch_log(
-                        session,
-                        prefix,
-                        vehicle,
-                        logs[name],
-                        folder / f"{vehicle} {name}",
-                        rate * 1000,
-                        lambda size, bar=bar: bar.update(size - bar.pos),  # type: ignore[misc]
-                    )
+            for name in logs:
+                with click.progressbar(length=known[name].size, label=name) as bar:
+                    path = folder / f"{meant[0]} {name}"
+                    fetch_log(session, prefix, known[name], path, rate * 1000, bar.update)
         except OSError as error:
             fail(f"{folder} cannot be written: {reason(error)}")
-    if names:
+    if logs:
         return
     if as_json:
-        print_json({"logs": [asdict(log) for log in logs.values()]})
+        print_json({"logs": [asdict(log) for each in found.values() for log in each]})
         return
-    for log in logs.values():
-        click.echo(f"{log.name}  {log.size / 1000:,.0f} kB")
-    if not logs:
-        say(f"{vehicle} has no telemetry logs", to_error=True)
+    for vehicle, each in found.items():
+        for log in each:
+            click.echo(f"{vehicle}: {log.name}  {log.size / 1000:,.0f} kB")
+        if not each:
+            say(f"{vehicle} has no telemetry logs", to_error=True)

@@ -32,6 +32,7 @@ NOT_RUN = {
     "naze-bridge fleet settings": "needs a router: tests/fleet/test_settings_command.py runs it",
     "naze-bridge fleet verify": "needs a router: tests/fleet/test_push_command.py runs it",
     "naze-bridge fleet pull": "needs a router: tests/fleet/test_push_command.py runs it",
+    "naze-bridge fleet logs": "needs a router: tests/fleet/test_logs.py runs it",
     "naze-bridge fleet mavlink": "needs a router: tests/service/cli/test_vehicle_relay.py runs it",
     "naze-bridge fly": "needs a firmware image: `make real-board FLY=1` flies some",
     "naze-bridge sim --image": "needs a firmware image: `make real-board` runs it",
