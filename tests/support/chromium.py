@@ -51,6 +51,15 @@ class Browser:
         self.run("location.hash = arguments[0]", task)
         self.wait_for_updates(1)
 
+    def resize(self, width: int, height: int) -> None:
+        # The window has a minimum width, and a phone is narrower.
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def darken(self, dark: bool) -> None:
+        feature = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [feature]})
+
     def unfold(self, selector: str) -> None:
         self.run("document.querySelector(arguments[0]).open = true", selector)
 
@@ -135,11 +144,8 @@ class Browsers:
         if dark not in self._drivers:
             self._drivers[dark] = _start(dark=dark)
         driver = self._drivers[dark]
-        width, height = size
-        # The window has a minimum width, and a phone is narrower.
-        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
-        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         page = Browser(driver, port)
+        page.resize(*size)
         page.traffic()
         page.errors()
         try:
