@@ -73,7 +73,7 @@ def _idle(folder: Path, board: Board) -> list[Figure]:
     floor = Floor(bare_percent, "bare polls")
     return [
         Figure("idle daemon, CPU of one core, no station has answered", unanswered_percent, "%", None, 2.0),
-        Figure("idle daemon, CPU of one core, default rates", percent, "%", floor, 2.6, times_floor=True),
+        Figure("idle daemon, CPU of one core, default rates", percent, "%", floor, 3.0, times_floor=True),
         Figure("idle daemon, CPU of one core, Mission Planner's rates", mission_planner_percent, "%", None, 2.0),
         Figure("idle daemon, resident", memory_mb, "MB", Floor(libraries_mb(LIBRARIES), "its libraries"), 42.0),
     ]
