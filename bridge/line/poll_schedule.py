@@ -230,9 +230,9 @@ class PollSchedule:
         return None if slot is None or slot.interval_s == inf else slot.interval_s
 
     def line_interval_s(self, command: Msp) -> float:
-        """The interval that the line's speed and missions on it allow, seconds, or 0 if it is not polled."""
+        """The interval that the line's speed, losses and missions allow, seconds, or 0 if it is not polled."""
         slot = self._slots.get(command)
-        scale = self._line_scale * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
+        scale = self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
         return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale, backoff=1.0)
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A board of which some replies or messages never arrive, as a `peer` of the world."""
 
+from random import Random
 from typing import Any
 
 _MSP, _MSP_V2, _MAVLINK_1 = b"$M>", b"$X>", 0xFE
 
 
 class MutedBoard:
-    """Any simulated board. `muted`: MSP commands and MAVLink message ids that are withheld from now on."""
+    """Any simulated board. `muted`: MSP commands and MAVLink message ids that are withheld from now on.
+
+    `lost_rate`: the part of all others that is withheld, too.
+    """
 
     def __init__(self, board: Any) -> None:
         self._board = board
         self._unread = bytearray()
         self.muted: frozenset[int] = frozenset()
+        self.lost_rate = 0.0
+        self._dice = Random(1)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._board, name)
@@ -23,7 +29,7 @@ class MutedBoard:
         passed = bytearray()
         while (found := self._first_frame()) is not None:
             size, number = found
-            if number not in self.muted:
+            if number not in self.muted and self._dice.random() >= self.lost_rate:
                 passed += self._unread[:size]
             del self._unread[:size]
         return bytes(passed)
