@@ -23,6 +23,8 @@ MEMORY_KB = 3000
 #: The simulated board's counters of harmful events. Not overflows of its receive ring: they are unavoidable if it
 #: hangs during two chunks, and the checksum detects them.
 TRAPS = ("hazard_runs", "tx_overflows", "cli_entered")
+#: Of the 200 that one address has, with room for those after the events.
+WRITES = 160
 #: Ground stations report a lost link after 3 to 3.5 s.
 LONGEST_GAP_S = 2.0
 #: Each value arms differently.
@@ -38,7 +40,7 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
     daemon = start.daemon(str(port), gcs=[f"udpin:127.0.0.1:{udp_port}", f"tcpin:127.0.0.1:{tcp_port}"])
     daemon.wait_up()
     meter = Meter(daemon.process.pid)
-    crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED))
+    crowd = Crowd(daemon, udp_port, tcp_port, random.Random(SEED), 60 * MINUTES / WRITES)
     stalls = Stalls()
     monitor = HeartbeatMonitor(("127.0.0.1", udp_port), stalls, daemon.process.pid)
     board_events: list[BoardEvents] = []

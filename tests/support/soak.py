@@ -193,9 +193,14 @@ class BoardEvents(threading.Thread):
 
 
 class Crowd:
-    """Ground stations that come and go, stall, move, send garbage and write missions; and attackers."""
+    """Ground stations that come and go, stall, move, send garbage and write missions; and attackers.
 
-    def __init__(self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random) -> None:
+    A write to the flight controller at most every `write_interval_s`: one address has 200 before the wear limit.
+    """
+
+    def __init__(
+        self, daemon: Daemon, udp_port: int, tcp_port: int, chance: random.Random, write_interval_s: float
+    ) -> None:
         self._daemon = daemon
         self._address = ("127.0.0.1", udp_port)
         self._tcp_port = tcp_port
@@ -204,6 +209,7 @@ class Crowd:
         self._abandoned: list[socket.socket] = []
         self.happened: Counter[str] = Counter()
         self.uploads: Counter[str] = Counter()
+        self._write_interval_s, self._may_write_at = write_interval_s, 0.0
         self._kinds: list[Callable[[Board], None]] = [self._upload, self._upload, self._upload, self._download]
         self._kinds += [
             self._visit,
@@ -243,6 +249,10 @@ class Crowd:
         return result is MissionResult.ACCEPTED
 
     def _upload(self, board: Board) -> None:
+        if (now := time.monotonic()) < self._may_write_at:
+            self._abandon_upload(board)
+            return
+        self._may_write_at = now + self._write_interval_s
         self.try_upload(board)
 
     def _download(self, board: Board) -> None:
