@@ -232,8 +232,7 @@ class PollSchedule:
     def line_interval_s(self, command: Msp) -> float:
         """The interval that the line's speed, losses and missions allow, seconds, or 0 if it is not polled."""
         slot = self._slots.get(command)
-        scale = self._line_scale * self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
-        return 0.0 if slot is None or slot.wanted_s == inf else self._interval(slot, scale, backoff=1.0)
+        return 0.0 if slot is None or slot.wanted_s == inf else self._present_interval(slot, backoff=1.0)
 
     def ask(self, link: MspLink, now: float, *, beside_missions: bool) -> None:
         """Send the requests that are due, and those nearly due with them, as far as the link has room."""
@@ -328,9 +327,9 @@ class PollSchedule:
         for slot in self._slots.values():
             slot.set_interval(self._present_interval(slot))
 
-    def _present_interval(self, slot: _Slot) -> float:
+    def _present_interval(self, slot: _Slot, backoff: float | None = None) -> float:
         scale = self._quality * (_BESIDE_MISSIONS if self._beside_missions else 1.0)
-        return self._interval(slot, self._line_scale * scale)
+        return self._interval(slot, self._line_scale * scale, backoff)
 
     def _interval(self, slot: _Slot, scale: float, backoff: float | None = None) -> float:
         is_status = slot.poll.command is Msp.STATUS
