@@ -14,6 +14,7 @@ from math import inf
 
 import serial
 
+from bridge.fc.profile import POLL_FOR
 from bridge.line.poll_schedule import POLLS, Poll
 from bridge.vehicle.telemetry_table import TELEMETRY
 from protocols.mavlink.codec import FrameWriter, pack
@@ -70,8 +71,8 @@ def _poll(loop: asyncio.AbstractEventLoop, link: str) -> None:
     loop.add_reader(port.fileno(), lambda: os.read(port.fileno(), 4096))
     intervals: dict[int, float] = {}
     for row in TELEMETRY:
-        if row.poll is not None:
-            intervals[row.poll] = min(row.interval_s, intervals.get(row.poll, inf))
+        if row.reading is not None and (poll := POLL_FOR.get(row.reading)) is not None:
+            intervals[poll] = min(row.interval_s, intervals.get(poll, inf))
     _ask_all(loop, port, intervals)
 
 

@@ -23,22 +23,6 @@ from protocols.msp.telemetry import (
     decode_status,
 )
 
-#: The poll whose reply carries a reading. The others are heard in MAVLink mode only.
-POLL_FOR: Mapping[type[v.Reading], Msp] = {
-    v.Orientation: Msp.ATTITUDE,
-    v.GpsFix: Msp.RAW_GPS,
-    v.GlobalPosition: Msp.RAW_GPS,
-    v.Height: Msp.ALTITUDE,
-    v.FlightState: Msp.STATUS,
-    v.Mode: Msp.STATUS,
-    v.Health: Msp.STATUS,
-    v.Power: Msp.ANALOG,
-    v.Charge: Msp.ANALOG,
-    v.Signal: Msp.ANALOG,
-    v.Sticks: Msp.RC,
-    v.MissionLeg: Msp.NAV_STATUS,
-    v.Readiness: Msp.INAV_STATUS,
-}
 _MAX_RSSI = 1020
 _STATUS_FLAGS = 32
 

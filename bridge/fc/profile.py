@@ -16,6 +16,7 @@ from bridge.line.poll_schedule import POLLS, Poll
 from bridge.missions.fc_mission_store import AnyFcMissionStore
 from bridge.missions.list_check import MissionRules
 from bridge.missions.place_lists import NO_PLACES
+from bridge.model import vehicle as v
 from bridge.model.craft import ARM_BOX, Airframe
 from bridge.model.missions import Refusal
 from bridge.model.vehicle import Vehicle
@@ -29,6 +30,21 @@ from protocols.plain_text import plain_text
 from protocols.rights.msp import Firmware
 from protocols.settings_file import SavedSettings
 
+#: The poll whose reply carries a reading, unless a profile names another. The others are heard in MAVLink mode only.
+POLL_FOR: Mapping[type[v.Reading], Msp] = {
+    v.Orientation: Msp.ATTITUDE,
+    v.GpsFix: Msp.RAW_GPS,
+    v.GlobalPosition: Msp.RAW_GPS,
+    v.Height: Msp.ALTITUDE,
+    v.FlightState: Msp.STATUS,
+    v.Mode: Msp.STATUS,
+    v.Health: Msp.STATUS,
+    v.Power: Msp.ANALOG,
+    v.Charge: Msp.ANALOG,
+    v.Signal: Msp.ANALOG,
+    v.Sticks: Msp.RC,
+    v.MissionLeg: Msp.NAV_STATUS,
+}
 _IDENT_SIZE = 7
 _VARIANT_SIZE, _VERSION_SIZE = 4, 3
 _MAX_REPLY_PAYLOAD = 200
@@ -131,8 +147,9 @@ class Profile:
 
     name: for people and logs. family: profiles of one firmware share it. A board that switches protocol stays in it.
     recognise: MSP only. Returns the flight controller if the interview shows that it is this kind.
-    polls: the telemetry questions it answers. decoders: by command, for replies in its own layout. The common decoders
-    are in bridge.fc.msp_telemetry. has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
+    polls: the telemetry questions it answers. poll_for: by reading, the one whose reply carries it.
+    decoders: by command, for replies in its own layout. The common decoders are in bridge.fc.msp_telemetry.
+    has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
     currents_per_a: the unit of ANALOG's current is 1 A divided by this.
     accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
@@ -152,6 +169,7 @@ class Profile:
     spoken: Spoken = Spoken.MSP
     recognise: Callable[[Interview], Conversation["FlightController | None"]] | None = None
     polls: tuple[Poll, ...] = POLLS
+    poll_for: Mapping[type[v.Reading], Msp] = field(default_factory=lambda: POLL_FOR)
     decoders: Mapping[int, Decoder] = field(default_factory=dict)
     has_2d_fix: bool = False
     currents_per_a: int = 100

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from math import floor, inf
 
-from bridge.fc.msp_telemetry import POLL_FOR
+from bridge.fc.profile import POLL_FOR
 from bridge.fc.session import FcSession
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation, Sender
@@ -45,7 +45,6 @@ _FASTEST_S = 0.01
 _ALL_STREAMS = messages.MAV_DATA_STREAM_ALL
 _ROWS = {row.msgid: row for row in TELEMETRY}
 _DEFAULTS_S = {row.msgid: row.interval_s for row in TELEMETRY}
-_POLLS = (*set(POLL_FOR.values()), Msp.FLIGHT)
 #: A message, and the reading that triggers it, or None for the clock.
 _Trigger = tuple[Row, type[Reading] | None]
 _SYS_STATUS = _ROWS[messages.MAVLINK_MSG_ID_SYS_STATUS]
@@ -80,7 +79,7 @@ class OwnVehicle:
         self._announced_home: Home | None = None
         self._also_wanted: Mapping[type[Reading], float] = {}
         #: The intervals of the messages and readings that `_rows` and the polls follow.
-        self._requested_rates: tuple[Mapping[int, float], Mapping[type[Reading], float]] = {}, {}
+        self._requested_rates: object = None
         self._newcomers_due = inf
         #: Armed, mode, failsafe and lost as last announced.
         self._announced: tuple[bool | None, FlightMode | str | None, bool, bool] | None = None
@@ -239,23 +238,28 @@ class OwnVehicle:
 
     def _set_polls(self, everyone: Sequence[GroundStation]) -> None:
         """Set each poll to the highest rate requested."""
-        polls = self._session.polls
-        requested_rates = fastest_s(everyone, _DEFAULTS_S), self._also_wanted
-        if requested_rates != self._requested_rates:
-            self._requested_rates = intervals_s, also_wanted = requested_rates
-            wanted: dict[Msp, float] = {}
-            for reading, interval_s in also_wanted.items():
-                _want(wanted, POLL_FOR.get(reading), interval_s)
+        polls, controller = self._session.polls, self._session.state.controller
+        poll_for = POLL_FOR if controller is None else controller.profile.poll_for
+        intervals_s = fastest_s(everyone, _DEFAULTS_S)
+        if (requested_rates := (intervals_s, self._also_wanted, poll_for)) != self._requested_rates:
+            self._requested_rates = requested_rates
+            readings: list[tuple[type[Reading] | None, float]] = [*self._also_wanted.items()]
             self._rows = {}
             for row in TELEMETRY:
                 interval_s = intervals_s[row.msgid]
                 if interval_s < inf:
                     for trigger in row.readings:
                         self._rows.setdefault(trigger, []).append((row, trigger))
-                _want(wanted, row.poll, interval_s)
+                readings.append((row.reading, interval_s))
+            wanted: dict[Msp, float] = {}
+            for kind, interval_s in readings:
+                if kind is not None and (poll := poll_for.get(kind)) is not None:
+                    wanted[poll] = min(wanted.get(poll, inf), interval_s)
             polls.want(wanted)
-        is_polled = self._session.state.link is not None
-        self._session.vehicle.stale_s = _stale_ages_s(polls.line_interval_s) if is_polled else {}
+        polled = {} if self._session.state.link is None else poll_for
+        line_s = {reading: polls.line_interval_s(poll) for reading, poll in polled.items()}
+        # The line may be too slow to poll them every second.
+        self._session.vehicle.stale_s = {kind: STALE_S * each_s for kind, each_s in line_s.items() if each_s > 1.0}
 
     def _moment(self, now: float, sent_seqs: SentSeqs = ()) -> Moment:
         boot_ms = int((now - self._started_at) * 1000) & 0xFFFFFFFF
@@ -376,16 +380,3 @@ class OwnVehicle:
         for message in self._moment(now).made(make.home_position):
             self._announced_home = home
             self._ground.broadcast(message)
-
-
-def _stale_ages_s(line_interval_s: Callable[[Msp], float]) -> dict[type[Reading], float]:
-    """The maximum ages of readings that the line is too slow to poll every second."""
-    slow = {poll: interval_s for poll in _POLLS if (interval_s := line_interval_s(poll)) > 1.0}
-    if Msp.FLIGHT in slow:  # a Harakiri's
-        slow[Msp.NAV_STATUS] = max(slow[Msp.FLIGHT], slow.get(Msp.NAV_STATUS, 0.0))
-    return {reading: STALE_S * slow[poll] for reading, poll in POLL_FOR.items() if poll in slow}
-
-
-def _want(wanted: dict[Msp, float], poll: Msp | None, interval_s: float) -> None:
-    if poll is not None:
-        wanted[poll] = min(wanted.get(poll, inf), interval_s)

@@ -4,11 +4,9 @@
 from dataclasses import dataclass
 from math import inf
 
-from bridge.fc.msp_telemetry import POLL_FOR
 from bridge.model import vehicle as v
 from bridge.vehicle import vehicle_messages as make
 from protocols.mavlink.dialect import messages as m
-from protocols.msp.commands import Msp
 
 NO_STREAM = -1
 #: MAV_DATA_STREAM's members, as ArduCopter fills them (GCS_Mavlink.cpp).
@@ -29,11 +27,6 @@ class Row:
     stream: int
     maker: make.Maker
     other: type[v.Reading] | None = None
-
-    @property
-    def poll(self) -> Msp | None:
-        """The request whose reply holds the reading."""
-        return None if self.reading is None else POLL_FOR.get(self.reading)
 
     @property
     def readings(self) -> tuple[type[v.Reading] | None, ...]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import all as m
 
+from bridge.fc.profile import POLL_FOR
 from bridge.vehicle.telemetry_table import NO_STREAM, TELEMETRY, Row
 
 PAGE = (Path(__file__).parents[2] / "docs" / "telemetry.md").read_text()
@@ -28,8 +29,9 @@ def name_of(row: Row) -> str:
 def test_each_message_on_the_page_matches_the_code(row: Row) -> None:
     (line,) = re.findall(rf"^- {name_of(row)}: (.*)$", PAGE, re.MULTILINE)
     after, rate, stream = line.rsplit(", ", 2)
-    if row.msgid != m.MAVLINK_MSG_ID_HOME_POSITION and row.poll is not None:
-        assert after.startswith(f"{row.poll.name} {row.poll.value}")
+    poll = None if row.reading is None else POLL_FOR.get(row.reading)
+    if row.msgid != m.MAVLINK_MSG_ID_HOME_POSITION and poll is not None:
+        assert after.startswith(f"{poll.name} {poll.value}")
     assert rate == ("on request" if row.interval_s == inf else f"{1 / row.interval_s:g} Hz")
     assert stream == ("none" if row.stream == NO_STREAM else STREAMS[row.stream])
 

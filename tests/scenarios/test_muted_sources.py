@@ -304,10 +304,13 @@ def test_an_unanswered_inav_request_blanks_only_its_values(number: int) -> None:
         assert None not in shown, (world.now, shown)
 
 
-def test_on_a_line_that_loses_5_percent_values_are_seldom_unknown() -> None:
+@pytest.mark.parametrize("stations", [0, 1])
+def test_on_a_line_that_loses_5_percent_values_are_seldom_unknown(stations: int) -> None:
     """Lost replies slow all polls down, and values remain fresh for as much longer."""
     world = World(peer=MutedBoard(make_board("inav")))
     world.wait_ready(30)
+    for _ in range(stations):
+        GroundStation(world).stay_connected()
     world.run(5)
     world.naze.lost_rate = 0.05
     world.run(10)

@@ -14,7 +14,7 @@ from bridge.controllers.msp_parts import MspPartSettings
 from bridge.fc.mavlink_telemetry import MavlinkReadings
 from bridge.fc.mission_flight import FLIGHT_DECODERS, FLIGHT_POLL, flight_report
 from bridge.fc.msp_telemetry import velocity
-from bridge.fc.profile import FlightController, Interview, Profile, Spoken
+from bridge.fc.profile import POLL_FOR, FlightController, Interview, Profile, Spoken
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import BOX_POLL, POLLS
 from bridge.model import vehicle as v
@@ -25,6 +25,7 @@ from bridge.voice import sentences
 from protocols.mavlink.dialect import Message
 from protocols.mavlink.dialect import messages as m
 from protocols.mission_item import MissionResult
+from protocols.msp.commands import Msp
 from protocols.msp.mission import INFO_SIZE, MissionCommand, decode_info
 from protocols.msp.mission_flight import SUMMARY, decode_summary
 from protocols.msp.telemetry import Sensor
@@ -168,6 +169,7 @@ PATCHED = Profile(
     missions=HarakiriMissions,
     settings=HarakiriFcSettings,
     polls=(*POLLS, BOX_POLL, FLIGHT_POLL),
+    poll_for={**POLL_FOR, v.MissionLeg: Msp.FLIGHT},
     decoders=FLIGHT_DECODERS,
     check_kind="harakiri",
     rules=lambda settings: HarakiriRules(takeoff_max_m=settings.takeoff_max_m),

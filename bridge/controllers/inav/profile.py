@@ -13,12 +13,12 @@ from bridge.controllers.inav.settings import InavFcSettings
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import NavProfile
 from bridge.fc.msp_telemetry import hear_box_flags
-from bridge.fc.profile import SILENCE_WITH_H7_S, Decoder, FlightController, Interview, Profile
+from bridge.fc.profile import POLL_FOR, SILENCE_WITH_H7_S, Decoder, FlightController, Interview, Profile
 from bridge.line.conversation import Conversation
 from bridge.line.poll_schedule import NAV_POLL, POLLS, Poll
 from bridge.missions.place_lists import NO_PLACES
 from bridge.model.craft import FAILSAFE_BOX, Airframe
-from bridge.model.vehicle import Airspeed, Charge, Health, Load, Power, Readiness, Signal, Source, Vehicle
+from bridge.model.vehicle import Airspeed, Charge, Health, Load, Power, Readiness, Reading, Signal, Source, Vehicle
 from protocols.msp.commands import Msp
 from protocols.msp.frame import request
 from protocols.msp.inav import (
@@ -52,6 +52,14 @@ INAV_POLLS = (
     Poll(Msp.INAV_DEBUG, request(Msp.INAV_DEBUG), 32, inf),
     Poll(Msp.INAV_TEMPERATURES, request(Msp.INAV_TEMPERATURES), 16, inf),
 )
+_POLL_FOR: Mapping[type[Reading], Msp] = {
+    Power: Msp.INAV_ANALOG,
+    Charge: Msp.INAV_ANALOG,
+    Signal: Msp.INAV_ANALOG,
+    Airspeed: Msp.INAV_AIR_SPEED,
+    Load: Msp.INAV_STATUS,
+    Readiness: Msp.INAV_STATUS,
+}
 _MAX_RSSI = 1023
 #: In INAV_STATUS.
 _BOX_FLAGS = 64
@@ -174,6 +182,7 @@ PROFILE = Profile(
     "INAV",
     recognise=_recognise,
     polls=(*POLLS, NAV_POLL, *INAV_POLLS),
+    poll_for={**POLL_FOR, **_POLL_FOR},
     decoders=INAV_DECODERS,
     arming_blockers=arming_blockers,
     has_2d_fix=True,

@@ -6,6 +6,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as messages
 
+from bridge.fc.profile import POLL_FOR
 from bridge.vehicle.telemetry_table import TELEMETRY, Row
 from protocols.mavlink.dialect import Message
 from protocols.msp.commands import Msp
@@ -131,7 +132,7 @@ def test_requests_do_not_exceed_the_lines_capacity(world: World) -> None:
 
 
 @pytest.mark.parametrize(
-    "row", [row for row in TELEMETRY if row.poll is not None], ids=lambda row: m.mavlink_map[row.msgid].msgname
+    "row", [row for row in TELEMETRY if row.reading in POLL_FOR], ids=lambda row: m.mavlink_map[row.msgid].msgname
 )
 def test_each_message_can_be_requested_once(world: World, row: Row) -> None:
     msgid = row.msgid
