@@ -6,7 +6,7 @@ import binascii
 import json
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,11 @@ from fleet.options import address_options, fleet_session, json_option, vehicle_o
 from fleet.payload import part, text, whole
 from fleet.roll_call import alive, chosen
 from fleet.session import NO_COMMANDS, FleetError, answer_of, ask_each
-from payloads.keys import LOG_LIST, LOG_READ, ZenohKey
-from payloads.mission_data import Json
+from payloads.keys import LOG_LIST, LOG_READ
 from storage.os_error import reason
 from terminal.command_group import PATH
 from terminal.printing import print_json
-from terminal.sentences import fail, say
+from terminal.sentences import complain, fail, say
 
 _TIMEOUT_S = 30.0
 #: The limit for a piece. A bridge sends 64 kB.
@@ -39,12 +38,17 @@ class Log:
     size: int
 
 
-def list_logs(session: zenoh.Session, prefix: str, vehicle: str) -> list[Log]:
-    """Newest first; FleetError."""
-    result = _ask(session, prefix, vehicle, LOG_LIST, None)
-    found = part(result, "logs")
-    logs = [(text(each, "name"), whole(each, "size")) for each in found if isinstance(each, dict)] if found else []
-    return [Log(vehicle, name, size) for name, size in logs if name is not None and size is not None]
+def list_logs(session: zenoh.Session, prefix: str, names: Sequence[str]) -> tuple[dict[str, list[Log]], dict[str, str]]:
+    """The logs by vehicle, newest first, and by vehicle why they are not known."""
+    found: dict[str, list[Log]] = {}
+    errors: dict[str, str | None] = dict.fromkeys(names, NO_COMMANDS)
+    for name, reply in ask_each(session, prefix, names, LOG_LIST.suffix, _TIMEOUT_S):
+        if reply is not None:
+            result, errors[name] = answer_of(reply)
+            logs = part(result or {}, "logs")
+            parts = [(text(each, "name"), whole(each, "size")) for each in (logs if isinstance(logs, list) else ())]
+            found[name] = [Log(name, log, size) for log, size in parts if log is not None and size is not None]
+    return found, {name: error for name, error in errors.items() if error is not None}
 
 
 def fetch_log(
@@ -64,8 +68,7 @@ def fetch_log(
         show(file.tell())
         while file.tell() < log.size:
             began_at = time.monotonic()
-            request = json.dumps({"name": log.name, "start": file.tell()}).encode()
-            piece, cost = _piece(_ask(session, prefix, log.vehicle, LOG_READ, request), file.tell())
+            piece, cost = _piece(session, prefix, log, file.tell())
             file.write(piece)
             file.flush()
             show(len(piece))
@@ -73,8 +76,14 @@ def fetch_log(
     partial.rename(path)
 
 
-def _piece(result: Json, start: int) -> tuple[bytes, int]:
-    """The piece of a log, and the size on the link."""
+def _piece(session: zenoh.Session, prefix: str, log: Log, start: int) -> tuple[bytes, int]:
+    """The piece of a log from `start`, and the size on the link."""
+    request = json.dumps({"name": log.name, "start": start}).encode()
+    replies = ask_each(session, prefix, [log.vehicle], LOG_READ.suffix, _TIMEOUT_S, request)
+    reply = next((each for _, each in replies if each is not None), None)
+    result, error = (None, NO_COMMANDS) if reply is None else answer_of(reply)
+    if result is None:
+        raise FleetError(f"{log.vehicle}: {error}")
     data = text(result, "data") or ""
     try:
         piece = zlib.decompressobj().decompress(base64.b64decode(data, validate=True), _MOST_BYTES)
@@ -83,16 +92,6 @@ def _piece(result: Json, start: int) -> tuple[bytes, int]:
     if whole(result, "start") != start or not piece:
         raise FleetError("the log has become shorter: fetch it again")
     return piece, len(data)
-
-
-def _ask(session: zenoh.Session, prefix: str, vehicle: str, key: ZenohKey, payload: bytes | None) -> Json:
-    for _, reply in ask_each(session, prefix, [vehicle], key.suffix, _TIMEOUT_S, payload):
-        if reply is not None:
-            result, error = answer_of(reply)
-            if result is None:
-                raise FleetError(f"{vehicle}: {error}")
-            return result
-    raise FleetError(f"{vehicle} {NO_COMMANDS}")
 
 
 @click.command("logs", short_help="List and fetch vehicles' telemetry logs.")
@@ -116,8 +115,10 @@ def fleet_logs(
         raise click.UsageError("logs are fetched from one vehicle: name it with one --vehicle")
     with fleet_session(where) as (session, prefix):
         meant = chosen(alive(session, prefix), names, prefix)
-        found = {name: list_logs(session, prefix, name) for name in meant}
-        known = {log.name: log for log in found[meant[0]]}
+        found, errors = list_logs(session, prefix, meant)
+        if errors and logs:
+            raise FleetError(f"{meant[0]}: {errors[meant[0]]}")
+        known = {log.name: log for log in found[meant[0]]} if logs else {}
         for name in logs:
             if name not in known or Path(name).name != name:
                 fail(f"{meant[0]} has no log {name!r}: `naze-bridge fleet logs --vehicle {meant[0]}` lists them")
@@ -125,17 +126,20 @@ def fleet_logs(
             folder.mkdir(parents=True, exist_ok=True)
             for name in logs:
                 with click.progressbar(length=known[name].size, label=name) as bar:
-                    path = folder / f"{meant[0]} {name}"
-                    fetch_log(session, prefix, known[name], path, rate * 1000, bar.update)
+                    fetch_log(session, prefix, known[name], folder / f"{meant[0]} {name}", rate * 1000, bar.update)
         except OSError as error:
             fail(f"{folder} cannot be written: {reason(error)}")
     if logs:
         return
     if as_json:
-        print_json({"logs": [asdict(log) for each in found.values() for log in each]})
-        return
-    for vehicle, each in found.items():
-        for log in each:
-            click.echo(f"{vehicle}: {log.name}  {log.size / 1000:,.0f} kB")
-        if not each:
-            say(f"{vehicle} has no telemetry logs", to_error=True)
+        print_json({"logs": [asdict(log) for each in found.values() for log in each], "errors": errors})
+    else:
+        for vehicle, each in found.items():
+            for log in each:
+                click.echo(f"{vehicle}: {log.name}  {log.size / 1000:,.0f} kB")
+            if not each and vehicle not in errors:
+                say(f"{vehicle} has no telemetry logs", to_error=True)
+        for vehicle, why in errors.items():
+            complain(f"{vehicle}: {why}")
+    if errors:
+        raise SystemExit(1)

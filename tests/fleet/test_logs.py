@@ -71,7 +71,7 @@ def test_an_unavailable_log_is_reported_in_one_sentence(fleet: Fleet, tmp_path: 
     unknown = fleet.ask("logs", "--vehicle", "kite", "2020-01-01 00-00-00.tlog", "--folder", tmp_path)
     assert (unknown.returncode, "kite has no log '2020-01-01 00-00-00.tlog'" in unknown.stderr) == (1, True)
     closed = fleet.ask("logs", "--vehicle", "owl")
-    assert (closed.returncode, "owl accepts no commands" in closed.stderr) == (1, True)
+    assert (closed.returncode, "owl: accepts no commands" in closed.stderr) == (1, True)
     for two in ("kite", "owl"), ():
         unclear = fleet.ask("logs", *(part for name in two for part in ("--vehicle", name)), NAME)
         assert (unclear.returncode, "name it with one --vehicle" in unclear.stderr) == (2, True)
@@ -80,6 +80,8 @@ def test_an_unavailable_log_is_reported_in_one_sentence(fleet: Fleet, tmp_path: 
 def test_the_logs_of_several_vehicles_are_listed(fleet: Fleet) -> None:
     fleet.start("emu", commands=I_KNOW)
     fleet.wait("kite", "emu")
-    listed = fleet.ask("logs", "--vehicle", "kite", "--vehicle", "emu")
-    assert (listed.returncode, listed.stdout) == (0, f"kite: {NAME}  200 kB\n")
-    assert listed.stderr == "emu has no telemetry logs\n"
+    listed = fleet.ask("logs")
+    assert (listed.returncode, listed.stdout) == (1, f"kite: {NAME}  200 kB\n")  # owl refuses
+    assert "emu has no telemetry logs\n" in listed.stderr
+    assert "naze-bridge: owl: accepts no commands" in listed.stderr
+    assert list(json.loads(fleet.ask("logs", "--json").stdout)["errors"]) == ["owl"]
