@@ -132,20 +132,21 @@ class Browser:
 
 
 class Browsers:
-    """Chromium with light and with dark pages; each is started once and kept until `close`, because its start takes
-    longer than most tests. Needs Debian's packages chromium and chromium-driver."""
+    """One Chromium, started once and kept until `close`, because its start takes longer than most tests.
+
+    Needs Debian's packages chromium and chromium-driver.
+    """
 
     def __init__(self) -> None:
-        self._drivers: dict[bool, Chrome] = {}
+        self._driver: Chrome | None = None
 
     @contextmanager
     def tab(self, port: int, size: tuple[int, int] = LAPTOP, *, dark: bool = False) -> Iterator[Browser]:
         """A browser's only tab, with `size` pixels, for the page at `port`."""
-        if dark not in self._drivers:
-            self._drivers[dark] = _start(dark=dark)
-        driver = self._drivers[dark]
+        driver = self._driver = self._driver or _start()
         page = Browser(driver, port)
         page.resize(*size)
+        page.darken(dark)
         page.traffic()
         page.errors()
         try:
@@ -155,11 +156,11 @@ class Browsers:
             driver.get("about:blank")
 
     def close(self) -> None:
-        for driver in self._drivers.values():
-            driver.quit()
+        if self._driver is not None:
+            self._driver.quit()
 
 
-def _start(*, dark: bool) -> Chrome:
+def _start() -> Chrome:
     programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
     if not all(programs.values()):
         pytest.skip("no browser here: apt-get install chromium chromium-driver")
@@ -167,8 +168,6 @@ def _start(*, dark: bool) -> Chrome:
     options.binary_location = str(programs["chromium"])
     for argument in (*_PLAIN, *_ONE_RENDERER):
         options.add_argument(argument)
-    if dark:
-        options.add_argument("--blink-settings=preferredColorScheme=0")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = Chrome(options, ChromeService(str(programs["chromedriver"])))
     driver.set_page_load_timeout(TIMEOUT_S * 2)
