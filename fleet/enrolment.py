@@ -112,7 +112,7 @@ class FleetFolder:
         members, router = self._load()
         if router is None or name not in members:
             present = sorted(each for each, member in members.items() if member.role is not Role.EXPELLED)
-            raise EnrolmentError(f"{name} is not a member; there are: {', '.join(present) or 'none'}")
+            raise EnrolmentError(f"{name} is not a member; the members are: {', '.join(present) or 'none'}")
         passwords = self._passwords()
         if passwords.pop(name, None) is not None:
             self._write_passwords(passwords)

@@ -36,10 +36,10 @@ def setting_values(data: object) -> SettingValues:
     if not isinstance(data, dict):
         raise ValueError("settings must be an object")
     if len(data) > MOST_SETTINGS:
-        raise ValueError(f"settings must be at most {MOST_SETTINGS}, no flight controller has more")
+        raise ValueError(f"settings must be at most {MOST_SETTINGS}: no flight controller has more")
     data = {name: value for name, value in data.items() if value is not None and is_setting_name(name)}
     for name, value in data.items():
         is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
         if not is_number and not isinstance(value, str):
-            raise ValueError(f"the setting {name} must be a number or a text")
+            raise ValueError(f"the setting {name} must be a number or text")
     return {name: value if isinstance(value, str) else float(value) for name, value in data.items()}

@@ -49,7 +49,7 @@ def assumed_home(items: Sequence[MissionItem], name: str) -> tuple[int, int] | N
     """The place of the first waypoint, if a list that is checked offline lacks a home; degrees * 1e7."""
     if items[0].lat_e7 or items[0].lon_e7:
         return None
-    complain(f"{name}, home is assumed at the first waypoint; `naze-bridge check --home LAT,LON` gives it")
+    complain(f"{name}, home is assumed at the first waypoint; `naze-bridge check --home LAT,LON` sets it")
     return next(((item.lat_e7, item.lon_e7) for item in items if item.lat_e7 and item.lon_e7), None)
 
 

@@ -52,7 +52,7 @@ def flash(client: BridgeClient, image: Path, battery: bool) -> None:
     except FirmwareFileError as error:
         fail(error, UNREADABLE)
     except ImageError as error:
-        fail(f"{error}; give the {_BUILT} that `naze-bridge firmware build` makes", UNREADABLE)
+        fail(f"{error}; use the {_BUILT} that `naze-bridge firmware build` makes", UNREADABLE)
     try:
         check_patched(program)
     except ImageError as error:

@@ -73,7 +73,7 @@ def _answer(line: str) -> Json:
             return answer
     except (ValueError, AttributeError, RecursionError):
         pass
-    raise ControlError("the daemon's answer cannot be read: is it of another release?")
+    raise ControlError("the daemon's answer cannot be read: is it from another release?")
 
 
 def socket_of_daemon(state_dir: Path) -> Path:

@@ -152,7 +152,7 @@ def _request(line: bytes) -> Json:
     try:
         request = json.loads(line)
     except RecursionError:
-        raise ValueError("it is nested too deep") from None
+        raise ValueError("it is nested too deeply") from None
     if not isinstance(request, dict):
         raise ValueError("it must be one JSON object on one line")
     return request

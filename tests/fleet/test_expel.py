@@ -152,5 +152,5 @@ def test_expelling_twice_is_harmless_and_a_stranger_is_named(fleet: Members) -> 
     stranger = fleet.expel("hawk")
     assert (stranger.returncode, stranger.stderr) == (
         1,
-        "naze-bridge: hawk is not a member; there are: anna, bert, owl\n",
+        "naze-bridge: hawk is not a member; the members are: anna, bert, owl\n",
     )

@@ -63,7 +63,7 @@ def parse_action(line: bytes, actions: Mapping[str, Action]) -> partial[Json]:
         json.dumps(request, ensure_ascii=False).encode()  # lone surrogates are not text
         action = actions[request.pop("action")]
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise HelperRefusal(f"This is not an action; there are {', '.join(actions)}") from None
+        raise HelperRefusal(f"This is not an action; the actions are {', '.join(actions)}") from None
     known = {name: each for name, each in signature(action).parameters.items() if each.kind is each.KEYWORD_ONLY}
     required = {name for name, each in known.items() if each.default is each.empty}
     if not required <= request.keys() <= known.keys() or any(

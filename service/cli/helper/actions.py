@@ -64,7 +64,7 @@ def apply_fix(pi: ThisPi, *, fix: str) -> Json:
     """One of the remedies in service/cli/doctor/fixes.py, by name."""
     step = fix_step(fix, pi.host)
     if step is None:
-        raise HelperRefusal("There is nothing to change here any more: check again.")
+        raise HelperRefusal("This needs no change any more: check again.")
     return pi.make([step])
 
 
@@ -84,7 +84,7 @@ def answer(
         raise HelperRefusal("A hotspot needs a name and a password.")
     check_answers(hotspot or None, password or None, country or None, name or None)
     if fc and fc not in _ports(pi.host):
-        raise HelperRefusal("There is no such port for a flight controller on this Pi: open this again.")
+        raise HelperRefusal("This Pi has no such port for a flight controller: reload the page.")
     earlier = earlier_choices(pi.host) or SetupChoices()
     answers = replace(
         earlier,
@@ -103,7 +103,7 @@ def answer(
 def install(pi: ThisPi, *, size: int) -> Json:
     """The body is a package of this program: check it, and install it in a separate process."""
     if not 0 < size <= MAX_PACKAGE:
-        raise HelperRefusal(f"A package has at most {MAX_PACKAGE >> 20} MB.")
+        raise HelperRefusal(f"A package can have at most {MAX_PACKAGE >> 20} MB.")
     return {"version": receive(pi, size)}
 
 

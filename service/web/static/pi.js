@@ -4,7 +4,7 @@ import { aftermath, askPi, hasToken, postWithToken } from "./daemon.js";
 import { action, byId, form, make, pressed, resultPlace, say } from "./dom.js";
 
 const PIECE = 256 * 1024, MOST_BYTES = 128 * 1024 * 1024;
-const LATER = "The bridge restarts during the installation, which takes some minutes. Then open this again to see the result.";
+const LATER = "The bridge restarts during the installation, which takes some minutes. Then reload the page to see the result.";
 
 const result = resultPlace(), panels = make("div", { class: "side-by-side" }), unlock = action("Unlock with the token", result, open, "primary");
 byId("pi").append(make("div", { class: "row", id: "unlock" }, unlock, result), panels);

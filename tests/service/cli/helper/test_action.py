@@ -24,7 +24,7 @@ from service.cli.helper.actions import ACTIONS
     ],
 )
 def test_an_unknown_action_is_refused(line: bytes) -> None:
-    with pytest.raises(HelperRefusal, match="This is not an action; there are overview, doctor, fix"):
+    with pytest.raises(HelperRefusal, match="This is not an action; the actions are overview, doctor, fix"):
         parse_action(line, ACTIONS)
 
 

@@ -54,7 +54,7 @@ def test_invalid_answers_have_no_effect(pi: FixablePi, wrong: dict[str, str], wh
 
 
 def test_the_hotspot_is_switched(pi: FixablePi) -> None:
-    with pytest.raises(HelperRefusal, match="nothing to change here"):
+    with pytest.raises(HelperRefusal, match="needs no change any more"):
         pi.ask("fix", fix="open the hotspot")
     pi.ask("answer", **_HOTSPOT)
     assert hotspot_name(pi) == "kite"

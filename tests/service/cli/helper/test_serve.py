@@ -51,7 +51,7 @@ def test_another_user_is_refused(pi: FixablePi, lock: Path) -> None:
     ("request_line", "why"),
     [
         (b"GET / HTTP/1.1", "not an action"),
-        (b'{"action": "downgrade"}', "not an action; there are fix, answer, settings"),
+        (b'{"action": "downgrade"}', "not an action; the actions are fix, answer, settings"),
         (b'{"action": "answer", "name": "\\ud800"}', "not an action"),
         (b'{"action": "answer", "hotspot": "a\\nb", "password": "long-enough"}', "not a network name"),
         (b'{"action": "answer", "hotspot": "a", "password": "12345678\\u0000"}', "a Wi-Fi password"),
