@@ -146,6 +146,8 @@ class Sinks:
         self.world.naze.muted = self.muted
 
     def message(self, message: Message) -> None:
+        if message.get_type() == "VFR_HUD" and not math.isnan(message.alt):  # without a GPS home's and the height
+            self.is_true("position.altitude_m", message.alt)
         for name, (kind, value) in SHOWN.items():
             if kind == message.get_type():
                 self.heard[name] = self.world.now, value(message)
@@ -238,6 +240,8 @@ class Sinks:
             return
         if value is not None and not (name == "position.lat_deg" and value == 0):
             assert at - self.muted_at <= STALE_S or age_s == 0.0, (self.world.now, name)
+        if elapsed_s < STEP_S and value is not None and not (name == "position.lat_deg" and value == 0):
+            self.is_true(name, value)
         is_silent = self.muted & NEEDED.get(SHOWN[name][0], set())
         if age_s == 0.0 and not self.is_slowed and not is_silent:
             assert elapsed_s <= STALE_S, (self.world.now, name, elapsed_s)
