@@ -2,9 +2,9 @@
 """Every key of a vehicle, in one table; docs/zenoh.md has the same.
 
 A key is `<prefix>/<vehicle>/<suffix>`: the prefix comes first, so that `fleet/*/v1/state` selects a whole fleet. The
-version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. Wildcards
-do not match verbatim chunks (@): they never send a command, and a recorder of `fleet/**` does not become a MAVLink
-ground station.
+version is part of each suffix, so that a subscriber of version 1 never gets a payload that it would misread. A wildcard
+does not match a verbatim chunk (@), so a recorder of `fleet/**` does not become a MAVLink ground station, and a command
+is refused unless the query names it in full.
 """
 
 from dataclasses import dataclass

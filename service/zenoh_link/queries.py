@@ -95,13 +95,15 @@ class Queries:
 
         def asked(query: zenoh.Query) -> None:
             question = Question(query, key, name, self._payloads, self._thread)
-            if places.acquire(blocking=False):
-                post(self._loop, self._begin, question, answerer, places)
+            if key.is_command and str(query.key_expr) != name:
+                refusal = "a wildcard does not send commands: name one vehicle and one command"
+            elif not places.acquire(blocking=False):
+                refusal = f"{_MAX_AT_ONCE} queries of this kind are being answered already: try again"
             else:
-                question.refuse(
-                    QueryRefused(f"{_MAX_AT_ONCE} queries of this kind are being answered already: try again")
-                )
-                question.end()
+                post(self._loop, self._begin, question, answerer, places)
+                return
+            question.refuse(QueryRefused(refusal))
+            question.end()
 
         session.declare_queryable(name, zenoh.handlers.Callback(asked, indirect=False))
 
