@@ -13,7 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, ParseError, fromstring
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7, refuse_decimal_comma
 from protocols.mission_item import Command, Frame, MissionItem
@@ -22,6 +22,10 @@ from protocols.remedies import Fault
 
 #: Characters. The parsed tree takes up to forty times the memory of the text.
 _MAX_SIZE = 2 * 2**20
+#: No program nests more. Without a limit, a search below each element would take the square of the file's size.
+_MAX_DEPTH = 50
+#: Characters parsed at once: other threads wait meanwhile.
+_PIECE = 4096
 _FEET = 0.3048
 #: What is compressed by other methods unpacks all at once, however large.
 _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -43,8 +47,30 @@ class _Point(NamedTuple):
     frame: Frame = Frame.GLOBAL_RELATIVE_ALT
 
 
+class _Tree(TreeBuilder):
+    """Names of elements and attributes lose their namespace and become lower-case."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name, self._depth = name, 0
+
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            raise MissionFileError(self._name, "", *Fault.DAMAGED_FILE(kind="XML"))
+        return super().start(_plain(tag), {_plain(key): value for key, value in attrs.items()})
+
+    def end(self, tag: str) -> Element:
+        self._depth -= 1
+        return super().end(_plain(tag))
+
+
+def _plain(name: str) -> str:
+    return name.rpartition("}")[2].lower()
+
+
 def parse_xml(text: str, name: str) -> Element:
-    """The root element. Names of elements and attributes lose their namespace and become lower-case.
+    """The root element, with names as of `_Tree`.
 
     A document type is refused, because the entities in it can grow without limit or name other files.
     """
@@ -52,15 +78,15 @@ def parse_xml(text: str, name: str) -> Element:
         raise MissionFileError(name, "", *Fault.LONG_XML())
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise MissionFileError(name, "", *Fault.DOCUMENT_TYPE())
+    parser = XMLParser(target=_Tree(name))  # noqa: S314 - without a document type it cannot have entities
+    text = text.lstrip()
     try:
-        root = fromstring(text.lstrip())  # noqa: S314 - without a document type it cannot have entities
+        for start in range(0, len(text), _PIECE):
+            parser.feed(text[start : start + _PIECE])
+        return parser.close()
     except ParseError as error:
         line, _ = error.position
         raise MissionFileError(name, f"line {line}", *Fault.DAMAGED_FILE(kind="XML")) from None
-    for element in root.iter():
-        element.tag = element.tag.rpartition("}")[2].lower()
-        element.attrib = {key.rpartition("}")[2].lower(): value for key, value in element.attrib.items()}
-    return root
 
 
 def read_kml(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:
@@ -83,7 +109,7 @@ def read_kmz(data: bytes, name: str, note: Note, alt_m: float | None) -> list[Mi
                 kml = file.read(_MAX_SIZE + 1)
     except StopIteration:
         raise MissionFileError(name, "", *Fault.NO_KML()) from None
-    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
+    except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError):
         raise MissionFileError(name, "", *Fault.DAMAGED_FILE(kind="KMZ")) from None
     return read_kml(parse_xml(file_text(kml), name), name, note, alt_m)
 

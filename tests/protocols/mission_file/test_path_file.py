@@ -4,6 +4,7 @@
 import io
 import tracemalloc
 import zipfile
+from contextlib import suppress
 
 import pytest
 
@@ -77,6 +78,16 @@ def test_reads_a_zipped_kml() -> None:
     assert read(zipped(kml(POINTS, "absolute"))) == flown(Frame.GLOBAL, 30, 40)
 
 
+def test_a_kmz_with_one_damaged_byte_is_read_or_refused() -> None:
+    whole = zipped(kml(POINTS, "absolute"))
+    for place in range(len(whole)):
+        for change in (1, 0x80):
+            damaged = bytearray(whole)
+            damaged[place] ^= change
+            with suppress(MissionFileError):
+                read(bytes(damaged))
+
+
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_a_zip_bomb_is_refused_before_it_is_unpacked(method: int) -> None:
     bomb = zipped("<kml>" + " " * (16 << 20), method)
@@ -121,6 +132,7 @@ def test_a_path_without_heights_needs_an_altitude(text: str) -> None:
         ("lat\tlon\talt\n51,4771\t0,0012\t30\n", "line 2: '51,4771' has a decimal comma"),
         (f"lat,lon,alt\n51.4771,0.0012,{'x' * 200_000}\n", "this table is damaged"),
         (b"PK\x03\x04" + bytes(60), "this KMZ is damaged"),
+        (gpx("<trk>" * 51 + "</trk>" * 51), "this XML is damaged"),
     ],
 )
 def test_refuses_with_the_place_and_a_remedy(data: str | bytes, words: str) -> None:
