@@ -20,6 +20,7 @@ from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
 from tests.support.mission_planner import MissionPlanner, UploadFailed
 from tests.support.plan import HOME, PlanRow, as_items, stored_fields, waypoint
+from tests.support.programs import until
 
 RULES = NavRules(NavProfile())
 #: Anticlockwise, as INAV stores it.
@@ -92,9 +93,14 @@ async def test_mavsdk_writes_and_reads_120_records(inav: Bench) -> None:
         await missions.upload_mission(read)
         assert stored(inav, 120) == records_of(plan)
         assert await refusal_of(missions, [HOME, waypoint(1), PlanRow(Command.DO_JUMP, p1=1.0, p2=1.0)])
-    newest = inav.daemon.missions()
-    assert [mission["outcome"] for mission in newest[:3]] == ["REJECTED", "VERIFIED", "VERIFIED"]
-    assert [mission["finding_count"] for mission in newest[1:3]] == [0, 0]
+
+    def newest() -> list[tuple[str, int]]:
+        return [(mission["outcome"], mission["finding_count"]) for mission in inav.daemon.missions()[:3]]
+
+    until(
+        lambda: [outcome for outcome, _ in newest()] == ["REJECTED", "VERIFIED", "VERIFIED"], "the refused one, stored"
+    )
+    assert [count for _, count in newest()[1:]] == [0, 0]
 
 
 async def written_again(write: Callable[[], Awaitable[None]]) -> None:

@@ -70,7 +70,7 @@ def test_a_request_is_carried_out_by_the_helper(web: WebBench, pi: FixablePi) ->
     ("request_", "why"),
     [
         ({"action": "overview", "command": "id"}, "The arguments of this action"),
-        ({"action": "fix", "fix": "rm -rf /"}, "nothing to change"),
+        ({"action": "fix", "fix": "rm -rf /"}, "no change any more"),
         ({"action": "settings", "values": {"sysid": "seven"}}, "MAVLink system id cannot have this value"),
     ],
 )
