@@ -20,7 +20,7 @@ from bridge.config import BridgeConfig, PassThroughRule
 from bridge.effects import BridgeEffect, PublishGroups, RecordFrames, RememberFlight, SendToBoard
 from bridge.fc.profile import FlightController, RuleSettings, Spoken
 from bridge.fc.session import FcSession
-from bridge.fc.states.base import Port
+from bridge.fc.states.base import FcLine
 from bridge.gcs.ground import Ground
 from bridge.gcs.ground_station import GroundStation
 from bridge.gcs.rights import LinkAccess
@@ -108,20 +108,19 @@ class Bridge:
         #: True while an autopilot speaks MAVLink itself: the bridge then does not send anything in its name.
         self.is_passing_through = False
 
-        owner, emit = config.settings, self._effects.append
-        ids = owner.sysid, config.compid
+        emit, ids = self._effects.append, (config.settings.sysid, config.compid)
         # Ground stations, and the line to the flight controller.
         ground = self._ground = Ground(
             *ids, emit, self._newcomer, *_access(config), config.is_near, is_recorded=config.has_log
         )
         routes = self._routes = Routes(ground)
         runner = self._runner = Runner(emit)
-        port = Port(config.speeds, config.profiles, runner, routes.from_autopilot)
-        session = self._session = FcSession(port, emit, self._controller_changed, config.flight)
+        fc_line = FcLine(config.speeds, config.profiles, runner, routes.from_autopilot)
+        session = self._session = FcSession(fc_line, emit, self._controller_changed, config.flight)
         #: The flight controller's readings, which are kept when it is lost.
-        self.vehicle = port.vehicle
+        self.vehicle = fc_line.vehicle
         # Missions, fences and rally points.
-        missions = self._missions = MissionService(port.vehicle, runner, emit)
+        missions = self._missions = MissionService(fc_line.vehicle, runner, emit)
         readiness = self._readiness = CraftReadiness(
             session, missions, ground, now, was_found=config.flight is not None, is_wired=None not in config.speeds
         )
@@ -139,10 +138,10 @@ class Bridge:
             session, missions, ground, readiness, types.capabilities, config.unix_time_s, now
         )
         self._reporter = VehicleReporter(session, missions, ground, settings, readiness, own.also_want, own.progress)
-        own_parameters = OwnParameters(port.vehicle, owner.sysid)
+        own_parameters = OwnParameters(fc_line.vehicle, config.settings.sysid)
         parameters = self._parameters = Parameters(own_parameters, settings, ground)
         calibration = self._calibration = Calibration(ground, session, missions, readiness, settings)
-        self._compass_check = CompassCheck(port.vehicle, ground)
+        self._compass_check = CompassCheck(fc_line.vehicle, ground)
         waypoint = SetWaypoint(missions, own, ground)
         commands = CommandService(ground, own, session, calibration, settings, parameters, waypoint, config.version)
         self._incoming = Incoming(ground, types.by_type, parameters, commands, own, session.send_mavlink, *ids, emit)
@@ -391,5 +390,5 @@ class Bridge:
 def _access(config: BridgeConfig) -> tuple[Mapping[str, LinkAccess], LinkAccess]:
     """The rules of each link, and of those without rules."""
     everything = config.settings.pass_through is PassThroughRule.EVERYTHING
-    links = {name: replace(access, passes_everything=everything) for name, access in config.links.items()}
+    links = {name: replace(access, passes_everything=everything) for name, access in config.access.items()}
     return links, LinkAccess(passes_everything=everything)

@@ -47,16 +47,16 @@ class BridgeConfig:
     """The configuration of one bridge. `speeds`: of the port, baud; (None,) if it lacks a speed.
 
     `version`: of the bridge itself. `unix_time_s`: the time of day at a monotonic time, None if unknown.
-    `links`: access rules by link name. Every station may write over other links. `is_near`: True for an IP address on
+    `access`: the rules by link name. A link without rules is open to all. `is_near`: True for an IP address on
     this machine's own networks, without a router in between. `has_log`: there is a telemetry log. `flight`: of the
-    craft that a previous bridge left armed. `seals`: of the settings of the boards seen before.
+    craft that a previous bridge left armed. `settings_memory`: of the settings of the boards seen before.
     """
 
     speeds: Sequence[int | None]
     settings: BridgeSettings = BridgeSettings()  # frozen
     compid: int = 1
     profiles: Sequence[Profile] = PROFILES
-    links: Mapping[str, LinkAccess] = field(default_factory=dict)
+    access: Mapping[str, LinkAccess] = field(default_factory=dict)
     is_near: Callable[[str], bool] = lambda _address: True
     version: str = ""
     unix_time_s: Callable[[float], float | None] = lambda _now: None

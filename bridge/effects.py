@@ -43,7 +43,7 @@ class PublishGroups:
 
 @dataclass(frozen=True, slots=True)
 class RememberFlight:
-    """Keep this for the BridgeConfig of a restarted bridge. Returns None if the craft is not armed."""
+    """Keep this for the BridgeConfig of a restarted bridge. `flight`: None if the craft is not armed."""
 
     flight: FlightMemory | None
 

@@ -46,7 +46,7 @@ class Verdict(Generic[RecordT]):
 
     `records` is the list for the flight controller, `items` the same as read back; both empty unless ACCEPTED.
     `sent_as` maps a record's place to the MAV_CMD that it was sent as, where the record is ambiguous (a region of
-    interest). `flight`: the length, heights and end in words. `path`: the legs, also of a list rejected for them.
+    interest, a hold). `flight`: length, heights and end in words. `path`: the legs, also of a list rejected for them.
     `assumed`: what the rules had to assume about board and craft. `findings` are in the order of the list. That of a
     rejection is the last.
     """

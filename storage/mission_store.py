@@ -41,8 +41,8 @@ class ReceivedMission:
     The dictionaries hold JSON values, NaN and infinities. received_at: unix seconds. source: the sender, e.g.
     "udp 192.168.4.2:14550 sysid 255". items: as sent. verdict: ACCEPTED, CLEARED or REJECTED. ack: the
     MAV_MISSION_ name. stored_items: as the flight controller should hold them. records: the bytes written, of
-    `record_count` records. checksum: their CRC-32. roi_commands: the command number that each stored region of
-    interest was sent as, by its seq. sent_seqs: as reports.verdict.SentSeqs.
+    `record_count` records. checksum: their CRC-32. roi_commands: by seq, the command number that an ambiguous record
+    (a region of interest, a hold) was sent as. sent_seqs: as reports.verdict.SentSeqs.
     """
 
     received_at: float
@@ -149,7 +149,7 @@ class MissionStore:
         return number
 
     def conclude(self, number: int, outcome: str, detail: str, at: float) -> None:
-        """Store the outcome. outcome: VERIFIED, REFUSED, FAILED...; at: unix seconds."""
+        """Store the outcome. outcome: VERIFIED, REJECTED, FAILED...; at: unix seconds."""
         with self._transaction(f"cannot store the outcome of mission {number}"):
             if self._line(number) is None:
                 raise StoreError(f"there is no mission {number} in {self._path}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Imports go one way: service -> bridge -> protocols, and down within bridge/ and service/.
 
-fleet/ needs no daemon on its machine: it shares with service/ only payloads/ and terminal/.
+fleet/ needs no daemon on its machine: above protocols/ and storage/ it shares payloads/ and terminal/ with service/.
 """
 
 import ast

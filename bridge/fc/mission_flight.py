@@ -41,7 +41,7 @@ _COMPASS_OFF_DEG = 20
 
 def _flight(vehicle: Vehicle, payload: bytes, _controller: FlightController, now: float) -> None:
     if (progress := decode_flight(payload)) is not None:
-        report = replace(flight_report(progress, vehicle.last_flight), summary=progress.summary)
+        report = replace(flight_report(progress, vehicle.last_report), summary=progress.summary)
         vehicle.hear(MissionLeg(now, Source.MSP, report))
 
 

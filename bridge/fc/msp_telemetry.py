@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Readings of the vehicle from MSP replies. The signs, orders and scales of MSP are known here and nowhere else."""
+"""Readings of the vehicle from MSP replies: the only place with the signs, orders and scales of common replies."""
 
 import math
 from collections.abc import Mapping

@@ -103,6 +103,7 @@ class Spoken(Enum):
     """The protocols that a flight controller may speak. In the command line it does not answer them."""
 
     MSP = "MSP"
+    #: A Harakiri's own, while it is armed: the bridge represents it.
     MAVLINK = "MAVLink"
     #: An autopilot that represents itself to ground stations. The bridge does not send anything in its name.
     OTHER_MAVLINK = "MAVLink, passed through"
@@ -151,7 +152,7 @@ class Profile:
     decoders: by command, for replies in its own layout. The common decoders are in bridge.fc.msp_telemetry.
     has_2d_fix: its RAW_GPS says 1 for 2D and 2 for 3D. Others say 1 for any fix.
     currents_per_a: the unit of ANALOG's current is 1 A divided by this.
-    accepts_any_byte: its parser acts on no byte runs inside a frame. turn_s: it serves one request in this time.
+    accepts_any_byte: inside a frame its parser ignores hazard bytes. turn_s: it serves one request in this time.
     silence_s: after this long without a reply it is gone: unplugged, reset, or switched to another protocol.
     missions: how they are written to it, or the reply to any attempt.
     fences, rally: its stores of fences and of rally points.

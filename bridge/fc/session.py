@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The line to one flight controller: searched, identified, polled, lost, searched again. Sans-IO.
+"""The line to one flight controller: searched for, identified, polled, lost, searched for again. Sans-IO.
 
 `TRANSITIONS` is the whole state machine; `bridge.fc.states` has a class for each state.
 """
@@ -7,7 +7,7 @@
 from collections.abc import Callable, Mapping
 
 from bridge.fc.profile import FlightController, Spoken
-from bridge.fc.states.base import Closed, Event, Found, Identified, Lost, Port, PortClosed, PortOpened, State
+from bridge.fc.states.base import Closed, Event, FcLine, Found, Identified, Lost, PortClosed, PortOpened, State
 from bridge.fc.states.mavlink import HarakiriMavlink, PassThrough
 from bridge.fc.states.msp import Cli, Identifying, Polling
 from bridge.fc.states.searching import Searching
@@ -39,38 +39,38 @@ class FcSession:
 
     def __init__(
         self,
-        port: Port,
+        fc_line: FcLine,
         emit: Emit,
         on_change: Callable[[FlightController | None, float], None],
         flight: FlightMemory | None,
     ) -> None:
-        self._port = port
+        self._fc_line = fc_line
         #: The flight controller's readings, kept when it is lost.
-        self.vehicle = self._port.vehicle
-        self.polls = self._port.polls
+        self.vehicle = self._fc_line.vehicle
+        self.polls = self._fc_line.polls
         #: The bytes to be written to the port at the state's `speed`, in order.
-        self.output = self._port.output
+        self.output = self._fc_line.output
         self._emit = emit
         self._on_change = on_change
         if flight is not None:
-            self._port.family = flight.family
+            self._fc_line.family = flight.family
             self.vehicle.resume(flight)
         #: The current state, with the flight controller, the MSP link, and the speed that the port must have.
-        self.state: State = Closed(self._port, PortClosed(None), 0.0)
+        self.state: State = Closed(self._fc_line, PortClosed(None), 0.0)
 
     @property
     def met_family(self) -> str | None:
         """The family of the board that was last identified over MSP since the port was opened."""
-        return self._port.met_family
+        return self._fc_line.met_family
 
     def flight_memory(self, now: float) -> FlightMemory | None:
         """The facts about an armed craft that a restarted bridge needs, or None unless it is armed."""
-        family = self._port.family
+        family = self._fc_line.family
         return None if family is None else self.vehicle.memory(family, now)
 
     def opened(self, now: float) -> None:
         # Another board may have been connected.
-        self._port.met_family = None
+        self._fc_line.met_family = None
         self.handle(PortOpened(), now)
 
     def closed(self, now: float, why: str | None) -> None:
@@ -98,7 +98,7 @@ class FcSession:
     def send_mavlink(self, frame: bytes) -> None:
         """Pass a ground station's frame on to an autopilot that speaks MAVLink itself."""
         if isinstance(self.state, PassThrough):
-            self._port.output.append(frame)
+            self._fc_line.output.append(frame)
 
     def handle(self, event: Event, now: float) -> None:
         """Go to the next state."""
@@ -106,7 +106,7 @@ class FcSession:
         after = TRANSITIONS[type(before)][event.spoken if isinstance(event, Found) else type(event)]
         if not isinstance(event, Identified):
             self._leave(before, event, now)
-        self.state = after(self._port, event, now)
+        self.state = after(self._fc_line, event, now)
         match event:
             case Found():
                 self._emit(FcSensed(speed_baud=event.speed, protocol=event.spoken.value, why=event.why))
@@ -119,9 +119,9 @@ class FcSession:
 
     def _leave(self, state: State, event: Event, now: float) -> None:
         """Forget the flight controller and end the conversations with it."""
-        self.state = Closed(self._port, event, now)
-        self._port.output.clear()
-        self._port.runner.link_down(now)
+        self.state = Closed(self._fc_line, event, now)
+        self._fc_line.output.clear()
+        self._fc_line.runner.link_down(now)
         if state.trouble or state.controller is not None:
             self._on_change(None, now)
         if state.controller is not None and isinstance(event, Lost):

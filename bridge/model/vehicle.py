@@ -3,7 +3,7 @@
 
 Decoders fill it (bridge/fc), and everything shown anywhere is made from it: MAVLink messages, zenoh, the status page,
 metrics. Units are SI, angles are in degrees. None means unknown. Values that arrive together are one reading with its
-arrival time, and `Vehicle.fresh` alone decides whether it is current. A lost link does not clear values.
+arrival time, and `Vehicle.fresh` says whether it is current. A lost link does not clear values.
 """
 
 from collections.abc import Mapping
@@ -356,14 +356,14 @@ class Vehicle:
         return reading if reading is not None and now <= reading.heard_at + limit_s else None
 
     @property
-    def last_flight(self) -> FlightReport | None:
+    def last_report(self) -> FlightReport | None:
         """The last report of a board that reports more on the mission than the record (Harakiri)."""
         leg = self.last(MissionLeg)
         return leg.report if leg is not None and isinstance(leg.report, FlightReport) else None
 
     def mission_flight(self, now: float) -> FlightReport | None:
         """The same of a board that flies the mission now."""
-        flight = None if self.fresh(MissionLeg, now) is None else self.last_flight
+        flight = None if self.fresh(MissionLeg, now) is None else self.last_report
         return flight if flight is not None and flight.is_flown else None
 
     def home_or_position(self) -> Home | None:

@@ -67,7 +67,7 @@ _AGAIN = Replaced("the station started again")
 
 
 class MissionUploads:
-    """All ground stations' uploads and clears."""
+    """All ground stations' uploads and clears. `tick` leaves the states `Waiting` and `Complete` (`_turn`)."""
 
     def __init__(self, missions: MissionService, ground: Ground, emit: Emit) -> None:
         self._missions = missions

@@ -140,7 +140,7 @@ class Incoming:
                 return False
             sender = self._ground.heard(station, frame, ids, now)
             if sender is None:
-                continue  # a text tells a station that does not answer the questions
+                continue  # not proven yet; if it never answers, a text says why
             if refused is not None:
                 self._answer_refused(refused, sender, frame)
             elif self.routes is not None:
@@ -250,7 +250,7 @@ class Incoming:
                 self._commands.refuse(sender, m.MAV_CMD_NAV_WAYPOINT)
                 sender.mission_ack(MissionResult.DENIED)
             else:
-                # Messages that are not about a list have the type of missions.
+                # A message without a mission_type (a command, a heartbeat) has the type of missions.
                 (of_type.handlers.get(msgid) or handler)(sender, message, now)
         elif msgid == m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST and of_type is not None:
             # Mission Planner ignores a refusal, and times out after 5 s.

@@ -140,7 +140,7 @@ class Daemon:
             BridgeConfig(
                 _speeds(settings.fc),
                 settings,
-                links={**self._signing.links, **_ZENOH},
+                access={**self._signing.links, **_ZENOH},
                 is_near=OwnNetworks(host),
                 version=version(),
                 has_log=self._tlog is not None,

@@ -322,7 +322,7 @@ class FcConnection:
 
     @asynccontextmanager
     async def lend(self) -> AsyncIterator[serial.Serial]:
-        """Lend the serial port, at 115200 baud. Afterwards the flight controller is searched again. PortError."""
+        """Lend the serial port, at 115200 baud. Afterwards the flight controller is searched for again. PortError."""
         if not isinstance(self._address, SerialFc | AutoFc):
             raise PortError(f"{self._address} is not a serial port")
         async with self._port.lend():

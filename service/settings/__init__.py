@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings: flags override the configuration files, which override the defaults."""
+"""The daemon's own settings (bridge/settings/ has the board's). Flags override files, files override defaults."""
 
 from service.settings.key import SettingsError
 from service.settings.load import default_state_dir, load_settings, takeoff_limit_m

@@ -74,7 +74,7 @@ def test_a_fence_and_rally_points_are_written_and_read_on_an_inav(session: Sessi
     assert dialogs(planner, 0) == []
 
 
-def test_rally_points_that_are_not_stored_are_refused_to_a_write_and_missing_for_a_read(session: Sessions) -> None:
+def test_unsupported_rally_points_are_refused_on_write_and_empty_on_read(session: Sessions) -> None:
     planner, _ = session()
     assert planner.read("RALLY")[1] == []
     assert dialogs(planner, 0) == []

@@ -177,7 +177,7 @@ class World:
         self._config = BridgeConfig(
             speeds,
             BridgeSettings(pass_through=PassThroughRule.EVERYTHING) if passes_everything else BridgeSettings(),
-            links=links or {},
+            access=links or {},
             is_near=is_near,
             profiles=profiles,
             settings_memory={} if memory is None else memory,

@@ -100,7 +100,7 @@ class HarakiriMissions(FcMissionStore[WpRecord]):
 
     def _read_flight(self) -> Conversation[FlightLimits | None]:
         """The settings that decide about a list in flight, or None for a board that does not fly it."""
-        if self._vehicle.last_flight is None:
+        if self._vehicle.last_report is None:
             return None
         values = yield from read_by_name(self._places, "mission_first", "mission_height", "mission_radius")
         return USUAL_FLIGHT if values is None else FlightLimits(*map(int, values))

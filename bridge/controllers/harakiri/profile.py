@@ -101,13 +101,13 @@ class HarakiriReadings(MavlinkReadings):
         progress = decode_summary(message.value) if message.name == SUMMARY else None
         if progress is None:
             return
-        before = self.vehicle.last_flight
+        before = self.vehicle.last_report
         reached = before.reached if before is not None and before.number else max((progress.record or 0) - 1, 0)
         report = replace(flight_report(replace(progress, reached=reached), before), way=None, summary=message.value)
         self.vehicle.hear(v.MissionLeg(now, v.Source.MAVLINK, report))
 
     def _mission_item_reached(self, message: Message, _now: float) -> None:
-        leg, flight = self.vehicle.last(v.MissionLeg), self.vehicle.last_flight
+        leg, flight = self.vehicle.last(v.MissionLeg), self.vehicle.last_report
         if leg is not None and flight is not None and flight.number:
             self.vehicle.hear(v.MissionLeg(leg.heard_at, leg.source, replace(flight, reached=message.seq)))
 

@@ -71,7 +71,7 @@ Event = PortOpened | PortClosed | Found | Identified | Lost
 
 
 @dataclass(slots=True)
-class Port:
+class FcLine:
     """Everything that outlives a state: settings, knowledge about the port, and shared parts of the bridge.
 
     `on_mavlink` gets the MAVLink frames of a passed-through autopilot and their kinds (protocols.mavlink.frame).
@@ -133,8 +133,8 @@ class State(ABC):
     #: True if the last bytes ended inside a frame without a change: slow lines deliver a reply in pieces.
     is_mid_frame: bool = False
 
-    def __init__(self, port: Port, event: Event, now: float) -> None:
-        self.port = port
+    def __init__(self, fc_line: FcLine, event: Event, now: float) -> None:
+        self.fc_line = fc_line
         #: The speed that the port must have, baud, or None where it has none.
         self.speed = event.speed if isinstance(event, Found) else None
 

@@ -5,7 +5,7 @@ from abc import abstractmethod
 
 from bridge.fc.mavlink_telemetry import MavlinkTelemetry
 from bridge.fc.profile import FlightController
-from bridge.fc.states.base import Event, Found, Lost, Port, State
+from bridge.fc.states.base import Event, FcLine, Found, Lost, State
 from bridge.line.msp_link import PROBE, byte_time_s
 from bridge.model.vehicle import FlightState, Source
 from protocols.mavlink.dialect import messages
@@ -32,9 +32,9 @@ class MavlinkLine(State):
     name = "MAVLink"
     controller: FlightController
 
-    def __init__(self, port: Port, event: Found, now: float) -> None:
-        super().__init__(port, event, now)
-        self.controller = port.controller_that_speaks(event.spoken)
+    def __init__(self, fc_line: FcLine, event: Found, now: float) -> None:
+        super().__init__(fc_line, event, now)
+        self.controller = fc_line.controller_that_speaks(event.spoken)
         self._splitter = MavlinkSplitter()
         self._heard_at = self._last_byte_at = now
         self._look_at = now + _LINE_SILENCE_S
@@ -81,10 +81,10 @@ class MavlinkLine(State):
 class PassThrough(MavlinkLine):
     """The autopilot gets only the frames of ground stations, and the bridge does not send in its name."""
 
-    def __init__(self, port: Port, event: Found, now: float) -> None:
-        super().__init__(port, event, now)
-        self.telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
-        port.meet(self.controller)
+    def __init__(self, fc_line: FcLine, event: Found, now: float) -> None:
+        super().__init__(fc_line, event, now)
+        self.telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(fc_line.vehicle))
+        fc_line.meet(self.controller)
         assert event.heard is not None
         heard = [event.heard.raw]
         self.telemetry.take(heard, kinds(heard), now)
@@ -92,22 +92,22 @@ class PassThrough(MavlinkLine):
     def take(self, frames: list[bytes], now: float) -> None:
         their_kinds = kinds(frames)
         self.telemetry.take(frames, their_kinds, now)
-        self.port.on_mavlink(frames, their_kinds)
+        self.fc_line.on_mavlink(frames, their_kinds)
 
 
 class HarakiriMavlink(MavlinkLine):
     """A Harakiri that speaks MAVLink. The bridge represents it, and sends only probes for MSP."""
 
-    def __init__(self, port: Port, event: Found, now: float) -> None:
-        super().__init__(port, event, now)
-        self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(port.vehicle))
-        port.meet(self.controller)
+    def __init__(self, fc_line: FcLine, event: Found, now: float) -> None:
+        super().__init__(fc_line, event, now)
+        self._telemetry = MavlinkTelemetry(self.controller.profile.mavlink_readings(fc_line.vehicle))
+        fc_line.meet(self.controller)
         self._msp = MspParser()
         self._probe_due = now + _PROBE_INTERVAL_S
         assert event.heard is not None
         if event.heard.msgid != messages.MAVLINK_MSG_ID_HEARTBEAT:
             # Unprompted, it sends more than heartbeats only while armed.
-            port.vehicle.hear(FlightState(now, Source.MAVLINK, True))
+            fc_line.vehicle.hear(FlightState(now, Source.MAVLINK, True))
         heard = [event.heard.raw]
         self._telemetry.take(heard, kinds(heard), now)
 
@@ -120,7 +120,7 @@ class HarakiriMavlink(MavlinkLine):
         event = super().tick(now)
         if event is None and now >= self._probe_due:
             self._probe_due = now + _PROBE_INTERVAL_S
-            self.port.output.append(PROBE)
+            self.fc_line.output.append(PROBE)
         return event
 
     @property
@@ -128,13 +128,13 @@ class HarakiriMavlink(MavlinkLine):
         return min(super().due, self._probe_due)
 
     def take(self, frames: list[bytes], now: float) -> None:
-        was_armed = self.port.vehicle.armed
+        was_armed = self.fc_line.vehicle.armed
         self._telemetry.take(frames, kinds(frames), now)
-        if was_armed and not self.port.vehicle.armed:
+        if was_armed and not self.fc_line.vehicle.armed:
             self._probe_due = now
 
     @property
     def timeout_s(self) -> float:
-        if not self.port.vehicle.armed:
+        if not self.fc_line.vehicle.armed:
             return super().timeout_s
         return _ARMED_SILENCE_S + _BYTES_BEFORE_LOSS * byte_time_s(self.speed)

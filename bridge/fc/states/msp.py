@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from bridge.fc.msp_telemetry import hear_msp
 from bridge.fc.profile import MSP_SILENCE_S, FlightController, Interview, NoAnswer, Profile, Spoken
-from bridge.fc.states.base import Event, Found, Identified, Lost, Port, State
+from bridge.fc.states.base import Event, FcLine, Found, Identified, Lost, State
 from bridge.line.conversation import Conversation, LinkLost
 from bridge.line.msp_link import FRSKY_SPEED, PROBE, MspLink, PendingReplies
 from bridge.voice.sentences import IN_COMMAND_LINE
@@ -32,8 +32,8 @@ class MspLine(State):
 
     link: MspLink
 
-    def __init__(self, port: Port, found: Found, link: MspLink, now: float) -> None:
-        super().__init__(port, found, now)
+    def __init__(self, fc_line: FcLine, found: Found, link: MspLink, now: float) -> None:
+        super().__init__(fc_line, found, now)
         self.link = link
         self.found = found
         self._foreign = _ForeignBytes(link)
@@ -74,11 +74,11 @@ class MspLine(State):
 
     def _take(self, frame: MspFrame, now: float) -> None:
         """A reply belongs to the conversation that waits for it, else to a poll."""
-        if frame.command in self.port.runner.awaited_replies:
-            self.port.runner.advance(frame, now)
-        elif self.controller is not None and frame.command in self.port.polls.commands:
-            self.port.polls.answered(frame)
-            hear_msp(self.port.vehicle, frame, self.controller, now)
+        if frame.command in self.fc_line.runner.awaited_replies:
+            self.fc_line.runner.advance(frame, now)
+        elif self.controller is not None and frame.command in self.fc_line.polls.commands:
+            self.fc_line.polls.answered(frame)
+            hear_msp(self.fc_line.vehicle, frame, self.controller, now)
 
     def _silent_since(self) -> float:
         return self.link.last_heard_at
@@ -100,11 +100,11 @@ class MspLine(State):
             return None
         heard = self._foreign.mavlink
         if heard is not None:
-            return Found(self.port.mavlink_of(heard), self.speed, "heard where MSP was answered before", heard)
+            return Found(self.fc_line.mavlink_of(heard), self.speed, "heard where MSP was answered before", heard)
         # At a much lower speed than the telemetry's, the port reads only a few wrong bytes, or none.
         why = "the incoming data is no longer MSP" if self._is_foreign() else f"no answer for {self._silence_s()} s"
         # A board that was armed at the speed of FrSky telemetry has disarmed, and is back at the previous, good speed.
-        has_disarmed = self.speed == FRSKY_SPEED and self.port.vehicle.armed
+        has_disarmed = self.speed == FRSKY_SPEED and self.fc_line.vehicle.armed
         return Lost(why, () if has_disarmed else _ARMED_SPEEDS, self.unanswered())
 
 
@@ -113,12 +113,12 @@ class Identifying(MspLine):
 
     name = "identifying"
 
-    def __init__(self, port: Port, event: Found, now: float) -> None:
+    def __init__(self, fc_line: FcLine, event: Found, now: float) -> None:
         owed = event.pending.size(event.speed, now)
-        super().__init__(port, event, MspLink(event.speed, port.output, now, owed), now)
+        super().__init__(fc_line, event, MspLink(event.speed, fc_line.output, now, owed), now)
         self._give_up_at = now + _IDENTIFY_TIMEOUT_S
-        port.runner.link_up(self.link)
-        self._task = port.runner.start(_identify(port.profiles), self._identified, now)
+        fc_line.runner.link_up(self.link)
+        self._task = fc_line.runner.start(_identify(fc_line.profiles), self._identified, now)
 
     def _identified(self, board: FlightController | LinkLost | None, _now: float) -> None:
         if isinstance(board, FlightController):
@@ -150,22 +150,22 @@ class Polling(MspLine):
     name = "MSP"
     controller: FlightController
 
-    def __init__(self, port: Port, event: Identified, now: float) -> None:
-        super().__init__(port, event.found, event.link, now)
+    def __init__(self, fc_line: FcLine, event: Identified, now: float) -> None:
+        super().__init__(fc_line, event.found, event.link, now)
         self.controller = controller = event.controller
         self._longest_silence_s = controller.profile.silence_s
-        port.met_family = controller.profile.family
+        fc_line.met_family = controller.profile.family
         if controller.info is not None:
             self.link.receiver_timeout_s = controller.info.inter_byte_timeout_ms / 1000
         self.link.any_byte = controller.profile.accepts_any_byte
         self.link.turn_s = controller.profile.turn_s
-        port.polls.begin(event.found.speed, controller.profile.polls, controller.profile.turn_s)
-        port.meet(controller)
+        fc_line.polls.begin(event.found.speed, controller.profile.polls, controller.profile.turn_s)
+        fc_line.meet(controller)
 
     def tick(self, now: float) -> Event | None:
         event = super().tick(now)
         if event is None:
-            self.port.polls.ask(self.link, now, beside_missions=self.port.runner.needs_line)
+            self.fc_line.polls.ask(self.link, now, beside_missions=self.fc_line.runner.needs_line)
         return event
 
     @property
@@ -174,7 +174,7 @@ class Polling(MspLine):
             return 0.0
         is_torn = self.link.parser.skipped_bytes > self._foreign.skipped_before
         silent_at = self.link.last_heard_at + (self._silence_s() if is_torn else self._longest_silence_s)
-        return min(self.link.due, self.port.polls.due(self.link), silent_at)
+        return min(self.link.due, self.fc_line.polls.due(self.link), silent_at)
 
 
 class Cli(State):
@@ -187,11 +187,11 @@ class Cli(State):
     name = "command line"
     trouble = IN_COMMAND_LINE()
 
-    def __init__(self, port: Port, event: Found, now: float) -> None:
-        super().__init__(port, event, now)
+    def __init__(self, fc_line: FcLine, event: Found, now: float) -> None:
+        super().__init__(fc_line, event, now)
         self._heard_at = self._sent_at = now
         self._begin_listening()
-        port.output.append(RUB_OUT_LINE)
+        fc_line.output.append(RUB_OUT_LINE)
 
     def receive(self, data: bytes, now: float) -> Event | None:
         self._heard_at = now
@@ -204,7 +204,7 @@ class Cli(State):
         if now >= self._ask_at:
             self._sent_at = now
             self._begin_listening()
-            self.port.output.append(typed_and_rubbed_out(PROBE))
+            self.fc_line.output.append(typed_and_rubbed_out(PROBE))
         return None
 
     @property

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from itertools import cycle, islice
 
 from bridge.fc.profile import Spoken
-from bridge.fc.states.base import Event, Found, Lost, Port, PortOpened, State
+from bridge.fc.states.base import Event, FcLine, Found, Lost, PortOpened, State
 from bridge.line.msp_link import PROBE, RESYNC, RESYNC_REPLY_SIZE, PendingReplies, byte_time_s
 from protocols.mavlink.frame import MavlinkFrame, MavlinkSplitter, is_autopilot_heartbeat
 from protocols.msp.command_line import EchoWatch
@@ -69,11 +69,11 @@ class Searching(State):
 
     name = "searching"
 
-    def __init__(self, port: Port, event: PortOpened | Lost, now: float) -> None:
-        super().__init__(port, event, now)
+    def __init__(self, fc_line: FcLine, event: PortOpened | Lost, now: float) -> None:
+        super().__init__(fc_line, event, now)
         first, self.pending = (event.first, event.pending) if isinstance(event, Lost) else ((), PendingReplies())
-        first = [speed for speed in first if speed in port.speeds]
-        self._order = visit_order(port.speeds, tuple(port.good_speeds), first)
+        first = [speed for speed in first if speed in fc_line.speeds]
+        self._order = visit_order(fc_line.speeds, tuple(fc_line.good_speeds), first)
         self.speed = next(self._order)
         self.found: Found | None = None
         self._visit = self._new_visit(now)
@@ -100,7 +100,7 @@ class Searching(State):
             if visit.heartbeat is not None:
                 sender = f"system {visit.heartbeat.sysid} component {visit.heartbeat.compid}"
                 why = f"heard {sender}, no answer to {visit.probes} MSP probes"
-                self._conclude(self.port.mavlink_of(visit.heartbeat), why)
+                self._conclude(self.fc_line.mavlink_of(visit.heartbeat), why)
             else:
                 self.speed = next(self._order)
                 self._visit = self._new_visit(now)
@@ -134,7 +134,7 @@ class Searching(State):
         """Send a probe. Return the time that it and the reply take on the wire."""
         self._visit.probes += 1
         self.pending.add(self.speed, reply_size, now)
-        self.port.output.append(frame)
+        self.fc_line.output.append(frame)
         return self._on_wire_s(frame)
 
     def _on_wire_s(self, frame: bytes) -> float:
@@ -175,6 +175,6 @@ class Searching(State):
 
     def _conclude(self, spoken: Spoken, why: str) -> None:
         self.found = Found(spoken, self.speed, why, self._visit.heartbeat, self.pending)
-        if self.speed in self.port.good_speeds:
-            self.port.good_speeds.remove(self.speed)
-        self.port.good_speeds.append(self.speed)
+        if self.speed in self.fc_line.good_speeds:
+            self.fc_line.good_speeds.remove(self.speed)
+        self.fc_line.good_speeds.append(self.speed)

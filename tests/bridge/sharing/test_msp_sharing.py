@@ -161,7 +161,7 @@ def test_mwp_connects_although_the_clock_is_not_set(command: int) -> None:
     assert world.inside.sharing.refused == {}
 
 
-def test_a_change_is_forwarded_after_a_look_at_the_arm_flag() -> None:
+def test_a_change_is_forwarded_after_checking_the_arm_flag() -> None:
     board = FakeInav()
     board.answers = {**board.answers, SET_SAFEHOME: b""}
     world, program = ready(board, may_write=True)

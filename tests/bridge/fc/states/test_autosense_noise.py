@@ -12,7 +12,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as messages
 
-from bridge.fc.states.base import Port, PortOpened
+from bridge.fc.states.base import FcLine, PortOpened
 from bridge.fc.states.searching import SPEEDS, Searching
 from bridge.line.runner import Runner
 from protocols.msp.frame import Direction, MspFrame, request
@@ -32,9 +32,9 @@ ALPHABETS = {
 
 
 def begin(*speeds: int, good: tuple[int, ...] = ()) -> Searching:
-    port = Port(speeds, (), Runner(lambda _effect: None), lambda _frames, _kinds: None)
-    port.good_speeds.extend(good)
-    return Searching(port, PortOpened(), 0.0)
+    fc_line = FcLine(speeds, (), Runner(lambda _effect: None), lambda _frames, _kinds: None)
+    fc_line.good_speeds.extend(good)
+    return Searching(fc_line, PortOpened(), 0.0)
 
 
 def listen(noise: bytes, search: Searching, chunk: int) -> set[int | None]:
@@ -46,7 +46,7 @@ def listen(noise: bytes, search: Searching, chunk: int) -> set[int | None]:
         now += chunk * 10 / (search.speed or 115200)
         search.receive(noise[start : start + chunk], now)
         search.tick(now)
-        search.port.output.clear()
+        search.fc_line.output.clear()
         assert search.found is None, (start, search.found)
     return visited
 
