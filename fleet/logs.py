@@ -2,7 +2,6 @@
 """`fleet logs`: a vehicle's telemetry logs over the uplink, in pieces: an interrupted fetch continues."""
 
 import base64
-import binascii
 import json
 import time
 import zlib
@@ -15,7 +14,7 @@ import click
 import zenoh
 
 from fleet.options import address_options, fleet_session, json_option, vehicle_option
-from fleet.payload import part, text, whole
+from fleet.payload import objects, text, whole
 from fleet.roll_call import alive, chosen
 from fleet.session import NO_COMMANDS, FleetError, answer_of, ask_each
 from payloads.keys import LOG_LIST, LOG_READ
@@ -25,8 +24,8 @@ from terminal.printing import print_json
 from terminal.sentences import complain, fail, say
 
 _TIMEOUT_S = 30.0
-#: The limit for a piece. A bridge sends 64 kB.
-_MOST_BYTES = 1 << 20
+#: A bridge's pieces have 64 kB, and MAVLink halves when packed. A bridge that lies must not fill this disk quickly.
+_MOST_BYTES, _MOST_PACKED, _MOST_SIZE = 1 << 16, 10, 1 << 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +44,8 @@ def list_logs(session: zenoh.Session, prefix: str, names: Sequence[str]) -> tupl
     for name, reply in ask_each(session, prefix, names, LOG_LIST.suffix, _TIMEOUT_S):
         if reply is not None:
             result, errors[name] = answer_of(reply)
-            logs = part(result or {}, "logs")
-            parts = [(text(each, "name"), whole(each, "size")) for each in (logs if isinstance(logs, list) else ())]
-            found[name] = [Log(name, log, size) for log, size in parts if log is not None and size is not None]
+            logs = [(text(each, "name"), whole(each, "size")) for each in objects(result or {}, "logs")]
+            found[name] = [Log(name, log, size) for log, size in logs if log and size is not None and size < _MOST_SIZE]
     return found, {name: error for name, error in errors.items() if error is not None}
 
 
@@ -84,14 +82,14 @@ def _piece(session: zenoh.Session, prefix: str, log: Log, start: int) -> tuple[b
     result, error = (None, NO_COMMANDS) if reply is None else answer_of(reply)
     if result is None:
         raise FleetError(f"{log.vehicle}: {error}")
-    data = text(result, "data") or ""
+    data = str(result.get("data"))
     try:
         piece = zlib.decompressobj().decompress(base64.b64decode(data, validate=True), _MOST_BYTES)
-    except (binascii.Error, zlib.error) as error:
+    except (TypeError, ValueError, zlib.error) as error:
         raise FleetError("this version does not understand the reply") from error
     if whole(result, "start") != start or not piece:
         raise FleetError("the log has become shorter: fetch it again")
-    return piece, len(data)
+    return piece, max(len(data), len(piece) // _MOST_PACKED)
 
 
 @click.command("logs", short_help="List and fetch vehicles' telemetry logs.")

@@ -12,6 +12,8 @@ import zenoh
 from payloads.mission_data import Json, printable
 from payloads.payload import decoded
 
+_SHOWN = 500
+
 
 def decode(sample: zenoh.Sample | zenoh.ReplyError) -> Json | None:
     """The object in a payload, JSON or CBOR by the encoding."""
@@ -30,9 +32,16 @@ def part(data: Json, *path: str) -> Any:
     return value
 
 
-def text(data: Json, *path: str) -> str | None:
+def objects(data: Json, *path: str) -> list[Json]:
+    """The objects in a list; anything else is left out."""
     value = part(data, *path)
-    return value if isinstance(value, str) else None
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+
+
+def text(data: Json, *path: str) -> str | None:
+    """A text to be shown, so at most 500 characters of it."""
+    value = part(data, *path)
+    return value[:_SHOWN] if isinstance(value, str) else None
 
 
 def number(data: Json, *path: str) -> float | None:

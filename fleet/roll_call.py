@@ -5,6 +5,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from string import hexdigits
+from time import monotonic
 
 import zenoh
 
@@ -67,17 +68,19 @@ def replies_of(
 ) -> dict[BridgeId, Json | None]:
     """These bridges' replies, None if unreadable. Replies of storages are ignored.
 
-    Ends when all have replied, or when no further reply has arrived for `pause_s`.
+    Ends when all have replied, or when no further bridge has replied for `pause_s`.
     """
     found: dict[BridgeId, Json | None] = {}
     if not bridges:
         return found
     replies: SimpleQueue[zenoh.Reply | None] = SimpleQueue()
     send_query(session, selector, replies.put, pause_s * _PAUSES)
+    ends_at = monotonic() + pause_s
     with suppress(Empty):
-        while len(found) < len(bridges) and (reply := replies.get(timeout=pause_s)) is not None:
+        while len(found) < len(bridges) and (reply := replies.get(timeout=max(0.0, ends_at - monotonic()))) is not None:
             bridge = replier(reply)
             if reply.ok is not None and bridge is not None and bridge in bridges:
+                ends_at = ends_at if bridge in found else monotonic() + pause_s
                 found[bridge] = decode(reply.ok)
     return found
 

@@ -23,6 +23,8 @@ DEFAULT_ENDPOINT = "tcp/localhost:7447"
 AT_ONCE = 50
 #: For peers that do not speak zenoh. zenoh's own default is 10 s.
 _OPEN_TIMEOUT_MS = 3000
+#: A bridge's longest reply, a piece of a log, has 88 kB.
+_MAX_MESSAGE_BYTES = 1 << 20
 
 
 class FleetError(Exception):
@@ -122,6 +124,7 @@ def _config(connect: Sequence[str], config_file: Path | None) -> zenoh.Config:
         "listen/endpoints": [],
         "scouting/multicast/enabled": False,
         "transport/unicast/open_timeout": _OPEN_TIMEOUT_MS,
+        "transport/link/rx/max_message_size": _MAX_MESSAGE_BYTES,
     }
     if endpoints:
         settings["connect/endpoints"] = endpoints

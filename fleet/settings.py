@@ -12,7 +12,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from fleet.options import address_options, fleet_session, json_option, staged_option, vehicle_option, vehicles_options
-from fleet.payload import part, text
+from fleet.payload import objects, part, text
 from fleet.push import FleetPush
 from fleet.push_command import Pushed, push_file, require_choice
 from fleet.roll_call import alive, chosen
@@ -218,7 +218,6 @@ def _summary(trial: SettingsTrial) -> tuple[str, str]:
     """The number of changes, and the rest in words."""
     if trial.plan is None:
         return "-", trial.error or ""
-    changes, left_out = (trial.plan.get(key) or [] for key in ("changes", "left_out"))
-    names = in_few_words([str(each.get("name")) for each in left_out])
-    details = [f"cannot be set: {names}"] if left_out else []
-    return str(len(changes)), "; ".join([*details, *filter(None, [trial.plan.get("notice")])])
+    left_out = [text(each, "name") or "?" for each in objects(trial.plan, "left_out")]
+    details = [f"cannot be set: {in_few_words(left_out)}"] if left_out else []
+    return str(len(objects(trial.plan, "changes"))), "; ".join(filter(None, [*details, text(trial.plan, "notice")]))

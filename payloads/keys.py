@@ -55,6 +55,8 @@ MISSION_LIST = ZenohKey(f"{_V}/mission/list", "mission_list", SampleDelivery.REP
 MISSION_REPORT = ZenohKey(f"{_V}/mission/report", "mission_report", SampleDelivery.RELIABLE, kept=16)
 MAVLINK_OUT = ZenohKey(f"@mavlink/{_V}/out", None, SampleDelivery.DROP)
 MAVLINK_IN = ZenohKey(f"@mavlink/{_V}/in", None, SampleDelivery.RELIABLE)
+#: More than a datagram of any link holds. Larger samples of these two are not MAVLink.
+MAX_MAVLINK_BYTES = 2048
 
 
 COMMANDS = f"@cmd/{_V}"

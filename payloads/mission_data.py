@@ -22,6 +22,7 @@ ACCEPTED = "MAV_MISSION_ACCEPTED"
 MAX_ITEMS = 500
 #: The greatest number allowed in a request.
 MOST = 2**31 - 1
+MOST_WHOLE = 2**53
 
 _SCALARS = frozenset((float, int, str, bool, type(None)))
 _WHOLE = {"seq": 65535, "command": 65535, "frame": 255}
@@ -68,11 +69,16 @@ def _layout(kind: Hashable) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any,
 
 
 def printable(value: Any) -> Any:
-    """Make the texts in plain data safe to print: a daemon or store that was taken over may hold anything."""
+    """Make plain data safe to print: a daemon or store that was taken over may hold anything.
+
+    Texts lose what is not printable. A whole number that a reader of JSON cannot hold becomes null.
+    """
     if isinstance(value, dict):
         return {printable(key): printable(each) for key, each in value.items()}
     if isinstance(value, list):
         return [printable(each) for each in value]
+    if isinstance(value, int) and abs(value) > MOST_WHOLE:
+        return None
     return plain_text(value) if isinstance(value, str) else value
 
 

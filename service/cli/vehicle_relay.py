@@ -10,7 +10,7 @@ from bridge.relay import Relays, WriteResult
 from fleet.payload import decode, part, text, whole
 from fleet.session import send_query
 from fleet.vehicle import BridgeId, replier
-from payloads.keys import CLEAR, MAVLINK_IN, MAVLINK_OUT, MISSION_CURRENT, STATUS, UPLOAD, full
+from payloads.keys import CLEAR, MAVLINK_IN, MAVLINK_OUT, MAX_MAVLINK_BYTES, MISSION_CURRENT, STATUS, UPLOAD, full
 from payloads.mission_data import Json, mission_findings, mission_items
 from protocols.mission_file import write_qgc_wpl
 from protocols.mission_item import ListIdentity, MissionItem, MissionResult
@@ -74,7 +74,7 @@ class VehicleRelay:
             self._on_input(self._name, accepted)
 
     def _heard(self, sample: zenoh.Sample) -> None:
-        if self._waiting < _MAX_WAITING:
+        if self._waiting < _MAX_WAITING and len(sample.payload) <= MAX_MAVLINK_BYTES:
             self._waiting += 1
             post(self._loop, self._take, sample.payload.to_bytes())
 
@@ -104,7 +104,10 @@ class VehicleRelay:
     def _mission(self, sample: zenoh.Sample) -> None:
         data = decode(sample) or {}
         count, checksum, items = whole(data, "count"), text(data, "checksum"), _items(part(data, "items"))
-        identity = None if count is None or checksum is None else ListIdentity(count, int(checksum, 16))
+        try:
+            identity = None if count is None or checksum is None else ListIdentity(count, int(checksum, 16))
+        except ValueError:
+            identity = None
         post(self._loop, self._relays.holds, self._name, items, identity)
 
     def send(self, frame: bytes) -> None:

@@ -47,8 +47,8 @@ class TelemetryLogs:
         return {"logs": [{"name": entry.name, "size": entry.stat().st_size} for entry in found[:_LISTED]]}
 
     def _read(self, name: str, start: int) -> bytes:
-        if self._folder is None or not is_log_name(name):
-            raise FileNotFoundError(name)
+        if self._folder is None or not is_log_name(name) or not (self._folder / name).exists():
+            raise FileNotFoundError("there is no such log; log/list names them")
         with open_regular(self._folder / name) as file:
             file.seek(start)
             return file.read(PIECE)

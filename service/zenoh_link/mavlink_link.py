@@ -7,15 +7,13 @@ from collections.abc import Set
 import zenoh
 
 from bridge.gcs.station import Peer
-from payloads.keys import MAVLINK_OUT
+from payloads.keys import MAVLINK_OUT, MAX_MAVLINK_BYTES
 from service.daemon.daemon import GcsConnections
 from service.machine.threads import post
 from service.zenoh_link.publisher import Publisher
 
 #: All subscribers are one peer: zenoh does not tell them apart.
 _READERS = Peer("zenoh", MAVLINK_OUT.suffix)
-#: More than a datagram of any link holds. Larger samples are not MAVLink.
-_MAX_BYTES = 2048
 #: Samples beyond this are dropped when they arrive faster than the event loop takes them.
 _MAX_WAITING = 64
 
@@ -51,7 +49,7 @@ class MavlinkLink:
         """The session undeclares everything."""
 
     def _arrived(self, sample: zenoh.Sample) -> None:
-        if self._waiting < _MAX_WAITING and len(sample.payload) <= _MAX_BYTES:
+        if self._waiting < _MAX_WAITING and len(sample.payload) <= MAX_MAVLINK_BYTES:
             self._waiting += 1
             post(self._loop, self._take, sample.payload.to_bytes())
 

@@ -124,6 +124,8 @@ def test_an_invalid_request_for_a_log_is_refused_with_the_form(
 ) -> None:
     bench, opened = commanded
     assert "the payload must be" in error(ask(opened, f"{COMMANDS}/log/read", payload))
+    unknown = json.dumps({"name": "../../etc/passwd", "start": 0}).encode()
+    assert error(ask(opened, f"{COMMANDS}/log/read", unknown)) == "there is no such log; log/list names them"
     assert "daemon.fault" not in bench.daemon.printed
 
 
