@@ -52,7 +52,8 @@ from service.cli.demo import ClientError, MissionClient, connect
 from storage.mission_store import VERIFIED, open_store
 from terminal.files import load_mission
 
-#: Debian's packages, and a program or file of each. The last is there once the kernel runs arm64's programs with it.
+#: Debian's packages, and a program or file of each. The last is there once the kernel runs arm64's programs with it; in
+#: a container first: mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc.
 _NEEDED = {
     "qemu-system-arm": "qemu-system-aarch64",
     "debootstrap": "debootstrap",
@@ -60,7 +61,7 @@ _NEEDED = {
     "mtools": "mcopy",
     "e2fsprogs": "mke2fs",
     "device-tree-compiler": "fdtput",
-    "qemu-user-static": "/proc/sys/fs/binfmt_misc/qemu-aarch64",
+    "--reinstall qemu-user-static": "/proc/sys/fs/binfmt_misc/qemu-aarch64",
 }
 _PROGRAM = Path(sys.executable).parent / "naze-bridge"
 _MISSION = PROJECT / "examples" / "naze-field.waypoints"
