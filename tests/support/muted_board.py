@@ -4,7 +4,8 @@
 from random import Random
 from typing import Any
 
-_MSP, _MSP_V2, _MAVLINK_1 = b"$M>", b"$X>", 0xFE
+#: Replies and errors.
+_MSP, _MSP_V2, _MAVLINK_1 = (b"$M>", b"$M!"), (b"$X>", b"$X!"), 0xFE
 
 
 class MutedBoard:
@@ -44,6 +45,6 @@ class MutedBoard:
             return (6 + head[3], head[4]) if len(head) >= 6 and len(head) >= 6 + head[3] else None
         if head and head[0] == _MAVLINK_1:
             return (8 + head[1], head[5]) if len(head) >= 8 and len(head) >= 8 + head[1] else None
-        if head and not (_MSP.startswith(head) or _MSP_V2.startswith(head)):
+        if head and not any(begin.startswith(head) for begin in (*_MSP, *_MSP_V2)):
             return 1, None
         return None
