@@ -13,7 +13,8 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers.expat import ExpatError, ParserCreate
 
 from protocols.mission_file.error import NO_HOME, MissionFileError, Note, file_degrees_to_e7, refuse_decimal_comma
 from protocols.mission_item import Command, Frame, MissionItem
@@ -48,7 +49,7 @@ class _Point(NamedTuple):
 
 
 class _Tree(TreeBuilder):
-    """Names of elements and attributes lose their namespace and become lower-case."""
+    """Names of elements and attributes lose their prefix and become lower-case."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -66,7 +67,7 @@ class _Tree(TreeBuilder):
 
 
 def _plain(name: str) -> str:
-    return name.rpartition("}")[2].lower()
+    return name.rpartition(":")[2].lower()
 
 
 def parse_xml(text: str, name: str) -> Element:
@@ -78,15 +79,17 @@ def parse_xml(text: str, name: str) -> Element:
         raise MissionFileError(name, "", *Fault.LONG_XML())
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise MissionFileError(name, "", *Fault.DOCUMENT_TYPE())
-    parser = XMLParser(target=_Tree(name))  # noqa: S314 - without a document type it cannot have entities
-    text = text.lstrip()
+    # ElementTree's own parser would repeat the namespace in each name, which takes the square of the file's size.
+    parser, tree, text = ParserCreate(), _Tree(name), text.lstrip()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = tree.start, tree.end, tree.data
     try:
         for start in range(0, len(text), _PIECE):
-            parser.feed(text[start : start + _PIECE])
-        return parser.close()
-    except ParseError as error:
-        line, _ = error.position
-        raise MissionFileError(name, f"line {line}", *Fault.DAMAGED_FILE(kind="XML")) from None
+            parser.Parse(text[start : start + _PIECE], False)
+        parser.Parse("", True)
+        return tree.close()
+    except ExpatError as error:
+        raise MissionFileError(name, f"line {error.lineno}", *Fault.DAMAGED_FILE(kind="XML")) from None
 
 
 def read_kml(root: Element, name: str, note: Note, alt_m: float | None) -> list[MissionItem]:

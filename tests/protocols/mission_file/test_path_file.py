@@ -100,6 +100,16 @@ def test_a_zip_bomb_is_refused_before_it_is_unpacked(method: int) -> None:
     assert most < 12 << 20
 
 
+def test_a_long_namespace_is_not_repeated_in_each_name() -> None:
+    names = " ".join(f'p:a{number}=""' for number in range(5000))
+    tracemalloc.start()
+    with pytest.raises(MissionFileError, match="does not contain a path"):
+        read(f'<gpx xmlns:p="{"u" * 65_536}"><b {names}/></gpx>')
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 12 << 20
+
+
 @pytest.mark.parametrize(
     "text",
     [
