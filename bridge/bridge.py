@@ -297,6 +297,7 @@ class Bridge:
         """Recover from a bug: end the running conversation and search for the flight controller again."""
         self._has_line_changed = True
         self._runner.reset(now)
+        self.settings.reset()
         self._session.restart(why, now)
 
     def tick(self, now: float) -> None:

@@ -2,17 +2,20 @@
 """Single-precision arithmetic, as on a flight controller."""
 
 import struct
+from math import inf, isfinite
 
 _FLOAT = struct.Struct("<f")
-#: Larger numbers cannot be packed.
-_LARGEST = 3e38
 
 
 def single(value: float) -> float:
-    (rounded,) = _FLOAT.unpack(_FLOAT.pack(value))
+    """The nearest number that a float holds; infinity beyond the largest."""
+    try:
+        (rounded,) = _FLOAT.unpack(_FLOAT.pack(float(value)))
+    except OverflowError:
+        return inf if value > 0 else -inf
     return float(rounded)
 
 
 def is_single(value: float, shown: float) -> bool:
     """True if a MISSION_ITEM, which has single precision, would carry both values as the same number."""
-    return value == shown or (abs(value) < _LARGEST and single(value) == single(shown))
+    return value == shown or (single(value) == single(shown) and isfinite(single(value)))

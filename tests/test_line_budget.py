@@ -11,9 +11,9 @@ import pytest
 _ROOT = Path(__file__).resolve().parents[1]
 _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
-#: Raised twice: the texts for pilots are in a table of their own (bridge/voice), and a vehicle that was taken over must
-#: not harm the fleet commands (tests/fleet/test_hostile_vehicle.py).
-CEILINGS = {_INSTALLED: 41_871, ("bridge",): 17_761}
+#: Raised twice: the texts for pilots are in a table of their own (bridge/voice), and what comes from a vehicle of the
+#: fleet, a board or the state folder is bounded where it is read.
+CEILINGS = {_INSTALLED: 41_918, ("bridge",): 17_780}
 
 
 def lines(packages: tuple[str, ...]) -> int:

@@ -24,6 +24,7 @@ from bridge.voice import sentences
 from bridge.voice.happening import Happening
 from protocols.msp.commands import Msp
 from protocols.msp.frame import Direction, request
+from protocols.plain_text import plain_text
 from protocols.rights import Effect
 from protocols.rights.msp import msp_right
 
@@ -224,7 +225,7 @@ class BoardSettings:
         name, value = work.name, work.value
         work.before = setting = None if table is None else table.find(name)
         if table is not None and setting is None:
-            return SettingRefusal(Cause.UNKNOWN_NAME, sentences.NO_SUCH_SETTING(name[:32]))
+            return SettingRefusal(Cause.UNKNOWN_NAME, sentences.NO_SUCH_SETTING(plain_text(name[:32])))
         if obstacle is not None:
             return obstacle
         if setting is None or self.known.freshness is Freshness.UNREAD:

@@ -61,7 +61,8 @@ def plan_restore(
 
     Settings of another firmware are refused: equal names may mean something else there.
     """
-    if source and source.split()[0] != board.split()[0]:
+    source = source.strip()
+    if source and source.partition(" ")[0] != board.partition(" ")[0]:
         return SettingRefusal(Cause.REFUSED, sentences.OTHER_FIRMWARE(source, board))
     changes: list[PlannedChange] = []
     left_out: list[LeftOut] = []
@@ -132,6 +133,10 @@ class LocalSettings:
         self._session = session
         self._is_restoring = False
         self.change, self.save = settings.change, settings.save
+
+    def reset(self) -> None:
+        """Forget a restore that ended with a fault."""
+        self._is_restoring = False
 
     @property
     def kind(self) -> str | None:

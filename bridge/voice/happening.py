@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Generic, TypeVarTuple
 
-from protocols.plain_text import plain_text
-
 #: Mission Planner shows each piece of a longer STATUSTEXT alone, and on the HUD only the last.
 LINE_LENGTH = 50
 #: A shortened name keeps this many characters.
@@ -54,8 +52,7 @@ class Sentence(Generic[*Ts]):
         self.lasts = lasts
 
     def __call__(self, *values: *Ts) -> "Happening":
-        """The happening. Texts in the values may be a stranger's."""
-        return Happening(self, tuple(plain_text(each) if isinstance(each, str) else each for each in values))
+        return Happening(self, values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,7 @@ from bridge.model.settings import TakenBackup
 from bridge.model.vehicle import GpsTime
 from payloads.mission_data import Json
 from reports.vehicle_groups import Group, VehicleReport
+from service.daemon.client import ControlError
 from service.daemon.fc_connection import FcConnection, Traffic
 from service.daemon.kept_state import FlightFile, LastSettings
 from service.daemon.store_worker import StoreWorker
@@ -124,6 +125,8 @@ class Daemon:
         self._lane = self._loop.lane
         self._loop.set_exception_handler(self._fault)
         self._warned: set[str] = set()
+        #: Those whose clients wait for the bridge.
+        self._answers: set[asyncio.Future[Any]] = set()
         self.settings = settings
         #: On the loop's clock.
         self.started_at = self._loop.time()
@@ -254,8 +257,13 @@ class Daemon:
             self._lane.set_timer(self.bridge.due, self._tick)
 
     async def answer(self, start: Callable[[Callable[[T], None], float], None]) -> T:
-        """Start an operation of the bridge at the given time, and wait until it calls back with the result."""
+        """Start an operation of the bridge at the given time, and wait until it calls back with the result.
+
+        ControlError if an error in the bridge ends it.
+        """
         future: asyncio.Future[T] = self._loop.create_future()
+        self._answers.add(future)
+        future.add_done_callback(self._answers.discard)
 
         def done(result: T) -> None:
             if not future.done():  # the client may have disconnected
@@ -312,6 +320,8 @@ class Daemon:
         _log.error("daemon.fault", what=context["message"], exc_info=error)
         if error is not None and "handle" in context:
             self.bridge.restart("internal error", self._loop.time())
+            for answer in (each for each in tuple(self._answers) if not each.done()):
+                answer.set_exception(ControlError("the daemon failed; see its log"))
             self.flush()
 
     def _tick(self, now: float) -> None:

@@ -3,11 +3,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 from bridge.model.craft import Airframe, FlightMemory, FlightMode, Home
 from bridge.model.settings import BoardId, Value
+from protocols.float32 import single
 from service.machine.host import Host
 from service.machine.state_file import StateFile
 
@@ -68,8 +70,8 @@ class FlightFile:
         version = flight["version"]
         return FlightMemory(
             family=str(flight["family"]),
-            armed_at=float(flight["armed_at"]),
-            made_at=float(flight["made_at"]),
+            armed_at=_number(flight["armed_at"], inf),
+            made_at=_number(flight["made_at"], inf),
             mode=None if flight["mode"] is None else FlightMode[flight["mode"]],
             home=_home(flight["home"]),
             boxes=tuple(map(str, flight["boxes"])),
@@ -83,8 +85,15 @@ class FlightFile:
 def _home(kept: Any) -> Home | None:
     if kept is None:
         return None
-    altitude_m = kept["altitude_m"]
-    return Home(int(kept["lat_e7"]), int(kept["lon_e7"]), None if altitude_m is None else float(altitude_m))
+    altitude_m = None if kept["altitude_m"] is None else _number(kept["altitude_m"], 1e5)
+    return Home(int(_number(kept["lat_e7"], 90e7)), int(_number(kept["lon_e7"], 180e7)), altitude_m)
+
+
+def _number(value: Any, most: float) -> float:
+    number = float(value)
+    if not isfinite(number) or abs(number) > most:
+        raise ValueError(f"{number} is out of range")
+    return number
 
 
 class LastSettings:
@@ -118,6 +127,8 @@ class LastSettings:
 
 def _settings(kept: Any) -> dict[str, Mapping[str, Value]]:
     return {
-        str(board): {str(name): value for name, value in values.items() if isinstance(value, int | float | str)}
+        str(board): {
+            str(name): value for name, value in values.items() if isinstance(value, str) or isfinite(single(value))
+        }
         for board, values in kept.items()
     }

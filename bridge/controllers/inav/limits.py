@@ -6,6 +6,7 @@ updateDesiredRTHAltitude, navigationRTHAllowsLanding and findNearestSafeHome (na
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from enum import Enum, IntEnum
 from typing import Any
@@ -18,6 +19,7 @@ from bridge.model.ground_track import Place, distance_m
 from protocols.msp.inav_places import FwApproach, Geozone, Safehome
 from protocols.msp.nav import FLY_HOME, LEGS, TURNS, NavAction, NavRecord
 from protocols.msp.nav_items import leg_speed
+from protocols.plain_text import shown
 from protocols.settings_file import SavedSettings
 from reports.finding import News
 
@@ -276,5 +278,16 @@ def _number(name: str, value: float | str) -> Any:
         return _CHOICES[name][value]
     try:
         return int(float(value))
-    except ValueError:
-        raise ValueError(f"{name} cannot be {value}") from None
+    except (ValueError, OverflowError):
+        raise ValueError(f"{name} cannot be {shown(value)}") from None
+
+
+def readable(values: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Those of a board's values that are numbers or choices."""
+    found = {}
+    for name, value in values.items():
+        with suppress(ValueError):
+            if name in SETTING_NAMES:
+                _number(name, value)
+            found[name] = value
+    return found

@@ -15,7 +15,7 @@ from dataclasses import replace
 from itertools import chain
 
 from bridge.controllers.inav.geozones import has_zones, read_zones_in_force
-from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits, Platform, platform_of
+from bridge.controllers.inav.limits import DECISIVE_NAMES, SETTING_NAMES, InavLimits, Platform, platform_of, readable
 from bridge.controllers.inav.places import read_approaches, read_safehomes, with_approaches, write_approaches
 from bridge.controllers.inav.settings import read_values
 from bridge.controllers.inav.zone_check import zone_ahead
@@ -217,15 +217,17 @@ class InavMissions(NavMissions, FliesToItems):
         if values is None or safehomes is None or zones is None:
             self._are_limits_doubtful = self._are_limits_silent = True
         elif values:
-            limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform, unknown=())
+            known = readable(values)
+            unknown = tuple(sorted(values.keys() - known.keys()))
+            limits = InavLimits(safehomes=safehomes, zones=zones, platform=self._platform, unknown=unknown)
             version = self._board.version or limits.version
-            self._limits = replace(limits, version=version).with_settings(values)
+            self._limits = replace(limits, version=version).with_settings(known)
 
     def _read_decisive_limits(self) -> Conversation[None]:
         """Another client may have changed them unnoticed: read again before each Write, a few requests."""
         if self._limits is not None and not self._vehicle.armed:
             values = yield from read_values(DECISIVE_NAMES)
-            self._limits = self._limits.with_settings(values or {})
+            self._limits = self._limits.with_settings(readable(values or {}))
 
     def _store_content(self, records: Mission) -> Mission:
         """SAVE selects the first mission, so the new mission goes there."""

@@ -148,6 +148,13 @@ def test_settings_are_unknown_without_a_board() -> None:
     assert isinstance(result, SettingRefusal)
 
 
+def test_a_strangers_name_is_safe_to_print_in_the_refusal() -> None:
+    _, client = ready(BOARDS["patched Harakiri"])
+    refused = client.change("\x1b[2J", 1)
+    assert isinstance(refused, SettingRefusal)
+    assert refused.text == "There is no setting [2J"
+
+
 def test_losing_the_board_ends_a_change() -> None:
     world, _ = ready(BOARDS["patched Harakiri"])
     results: list[Answer] = []

@@ -176,6 +176,15 @@ def test_one_restore_runs_at_a_time() -> None:
     assert outcome(restored(world, {"p_roll": 50.0})).is_saved
 
 
+def test_after_a_fault_a_restore_can_begin() -> None:
+    world, _ = ready(BOARDS[NAZE])
+    ended: list[object] = []
+    world.bridge.settings.restore({"p_roll": 44.0}, "", "client", lambda _: None, lambda *_: ended.append(1), world.now)
+    world.bridge.restart("internal error", world.now)
+    world.wait_ready(30)
+    assert outcome(restored(world, {"p_roll": 50.0})).is_saved
+
+
 def test_another_clients_change_prevents_the_save() -> None:
     world, _ = ready(BOARDS[NAZE])
 
@@ -236,6 +245,7 @@ def plan(wanted: dict[str, Value], source: str = BOARD, table: SettingTable = TA
         ("p_roll", 201.0, "it must be 0..200"),
         ("p_roll", 40.5, "it must be 0..200"),
         ("p_roll", "high", "it must be 0..200"),
+        ("p_roll", 1e39, "it must be 0..200"),
         ("mode", "NEVER", "it is one of AUTO, 115200"),
         ("name", "too long a name", "it must be 0 to 8 characters"),
         ("gbl_flg", 2.0, "it can crash"),
@@ -279,7 +289,8 @@ def test_settings_of_another_version_carry_a_notice() -> None:
     found = plan({"p_roll": 40.0}, "Harakiri 2.0.0")
     assert found.changes
     assert "Harakiri 2.0.0" in found.notice
-    assert plan({"p_roll": 40.0}, "").notice == ""
+    for unknown in ("", "  "):
+        assert plan({"p_roll": 40.0}, unknown).notice == ""
 
 
 @given(st.dictionaries(st.sampled_from([*NAMES, "other"]), VALUES, min_size=1))

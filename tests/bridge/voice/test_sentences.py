@@ -7,7 +7,7 @@ from string import Formatter
 import pytest
 
 from bridge.voice.happening import Happening, Severity
-from bridge.voice.sentences import NO_SUCH_SETTING, prearm_lines, settings_changed, table
+from bridge.voice.sentences import prearm_lines, settings_changed, table
 from bridge.voice.stations import Kind, pieces, rendered
 
 TABLE = table()
@@ -57,10 +57,6 @@ def test_an_unsupported_command_is_not_a_failed_check() -> None:
 def test_texts_in_the_table_are_unique() -> None:
     texts = Counter((sentence.severity, sentence.text) for sentence in TABLE.values() if sentence.text != "{}")
     assert [text for text, count in texts.items() if count > 1] == []
-
-
-def test_a_strangers_name_in_a_text_is_safe_to_print() -> None:
-    assert NO_SUCH_SETTING("\x1b[2J").text == "There is no setting [2J"
 
 
 def test_the_longest_values_are_those_of_the_text() -> None:

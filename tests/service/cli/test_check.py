@@ -209,7 +209,7 @@ def test_an_inavs_saved_settings_decide_about_the_missions(tmp_path: Path) -> No
     dump.write_text("NVMAXALT,0\nnav_max_altitude,3000\n")
     assert run("--kind", "inav", "--settings", dump, mission).exit_code == 0
     for text, wrong in (
-        ("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be X"),
+        ("set nav_rth_alt_mode = X\n", "nav_rth_alt_mode cannot be 'X'"),
         ("", "does not contain settings"),
     ):
         dump.write_text(text)

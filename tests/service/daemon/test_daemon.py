@@ -87,7 +87,7 @@ async def test_a_wrong_clock_is_reported_until_a_network_sets_it(tmp_path: Path)
 
 
 async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_path: Path) -> None:
-    """Telemetry continues afterwards."""
+    """Telemetry continues afterwards, and a client that waits for an answer gets the reason."""
     with capture_logs() as events:
         daemon = Daemon(Settings(SimulatedFc(), state_dir=tmp_path))
         running = asyncio.create_task(daemon.run())
@@ -98,6 +98,8 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
                     await asyncio.sleep(0.01)
 
         await found()
+        answer: asyncio.Task[None] = asyncio.create_task(daemon.answer(lambda _done, _now: None))
+        await asyncio.sleep(0)
         healthy = inside(daemon.bridge).session.tick
 
         def faulty(_now: float) -> None:
@@ -109,6 +111,8 @@ async def test_an_exception_in_the_bridge_is_logged_and_the_line_restarted(tmp_p
             while inside(daemon.bridge).session.state.controller is not None:  # noqa: ASYNC110
                 await asyncio.sleep(0)
         await found()
+        with pytest.raises(ControlError, match="the daemon failed"):
+            await answer
         running.cancel()
         with suppress(asyncio.CancelledError):
             await running

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flight memory counts only after a short stop, on the same port, and until the computer restarts."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,15 @@ def test_another_port_boot_or_time_is_another_flight(tmp_path: Path, other: dict
 def test_a_damaged_file_is_ignored(tmp_path: Path, damaged: bytes) -> None:
     leave(tmp_path, FLIGHT)
     (tmp_path / FLIGHT_FILE).write_bytes(damaged)
+    assert found(tmp_path) is None
+
+
+@pytest.mark.parametrize(("name", "value"), [("altitude_m", "NaN"), ("altitude_m", "1e400"), ("lat_e7", "1e30")])
+def test_a_place_out_of_range_is_ignored(tmp_path: Path, name: str, value: str) -> None:
+    leave(tmp_path, FLIGHT)
+    file = tmp_path / FLIGHT_FILE
+    file.write_text(re.sub(rf'"{name}": [-.0-9]+', f'"{name}": {value}', file.read_text()))
+    assert value in file.read_text()
     assert found(tmp_path) is None
 
 

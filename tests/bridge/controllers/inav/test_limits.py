@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An INAV's own settings decide whether it arms with a list, and how it flies it: the answer comes at Write."""
 
+import math
 import struct
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from bridge.controllers.inav.limits import InavLimits, Platform, RthAltMode, SafehomeUsageMode, saved_limits
+from bridge.controllers.inav.limits import InavLimits, Platform, RthAltMode, SafehomeUsageMode, readable, saved_limits
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import NavProfile
 from bridge.missions.list_check import check_list
@@ -230,6 +231,16 @@ def test_settings_are_read_from_a_dump_and_from_a_param_file() -> None:
     assert saved_limits(params) == expected
 
 
+@pytest.mark.parametrize("value", [math.inf, math.nan, 10**400, "high"])
+def test_a_boards_value_of_another_type_counts_as_unknown(value: float | str) -> None:
+    assert readable({"nav_max_altitude": value, "nav_rth_altitude": 2000, "other": "x"}).keys() == {
+        "nav_rth_altitude",
+        "other",
+    }
+
+
 def test_a_value_unknown_to_inav_is_refused() -> None:
-    with pytest.raises(ValueError, match="nav_rth_alt_mode cannot be SOMETIMES"):
+    with pytest.raises(ValueError, match="nav_max_altitude cannot be '1e400'"):
+        saved_limits(read_settings_file(b"set nav_max_altitude = 1e400\n", "dump.txt"))
+    with pytest.raises(ValueError, match="nav_rth_alt_mode cannot be 'SOMETIMES'"):
         saved_limits(read_settings_file(b"set nav_rth_alt_mode = SOMETIMES\n", "dump.txt"))
