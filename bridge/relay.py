@@ -170,7 +170,7 @@ class _RemoteMissions(MissionService):
         super().__init__(vehicle, runner, lambda _ended: None)
         self._ground = ground
         self._effects = effects
-        self.is_local = False
+        self.is_local = self.are_kept = False  # the vehicle keeps them
         self.results: list[WriteResult] = []
 
     def armed_refusal(self) -> Refusal | None:

@@ -13,7 +13,7 @@ _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
 #: Raised twice: the texts for pilots are in a table of their own (bridge/voice), and what comes from a vehicle of the
 #: fleet, a board or the state folder is bounded where it is read.
-CEILINGS = {_INSTALLED: 41_918, ("bridge",): 17_780}
+CEILINGS = {_INSTALLED: 41_920, ("bridge",): 17_782}
 
 
 def lines(packages: tuple[str, ...]) -> int:

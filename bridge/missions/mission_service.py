@@ -126,6 +126,8 @@ class MissionService:
     mission_type: int = 0
     #: The current flight controller stores such lists, or did until it was lost. Missions are always answered.
     are_stored: bool = True
+    #: Missions are also kept on the Pi.
+    are_kept: bool = True
 
     def __init__(self, vehicle: Vehicle, runner: Runner, do: Callable[[MissionEnded | NoteReader], object]) -> None:
         self.vehicle = vehicle

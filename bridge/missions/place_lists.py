@@ -25,7 +25,7 @@ class PlaceLists(MissionService):
         self, mission_type: int, name: str, vehicle: Vehicle, runner: Runner, on_change: Callable[[], None]
     ) -> None:
         super().__init__(vehicle, runner, lambda _ended: None)
-        self.mission_type = mission_type
+        self.mission_type, self.are_kept = mission_type, False
         self._name, self._on_change = name, on_change
         self.fc_store, self.are_stored = NO_PLACES, False
 

@@ -30,9 +30,9 @@ _NOT_WHOLE = Refusal(MissionResult.UNSUPPORTED, sentences.NOT_WHOLE())
 class UploadAnswers:
     """Answers ground stations. Each one's last answer is remembered for 10 s."""
 
-    def __init__(self, ground: Ground, mission_type: int = 0) -> None:
+    def __init__(self, ground: Ground, mission_type: int, *, are_kept: bool) -> None:
         self._ground = ground
-        self._mission_type = mission_type
+        self._mission_type, self._are_kept = mission_type, are_kept
         #: True if the flight controller cannot store fences and rally points.
         self.are_only_missions_stored = True
         #: The answers that are to be sent again.
@@ -82,7 +82,7 @@ class UploadAnswers:
         for line in finding_lines(verdict.findings) if accepted else ():
             if line.text != delivery.text:
                 sender.say(line)
-        if delivery.number is None and not self._mission_type:  # the Pi does not store others
+        if delivery.number is None and self._are_kept:
             sender.say(sentences.NOT_STORED_ON_PI())
         sender.say(delivery.why)
         if delivery.change is not None:

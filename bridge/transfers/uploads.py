@@ -75,7 +75,7 @@ class MissionUploads:
         self._emit = emit
         #: In the order of their MISSION_COUNT.
         self._uploads: list[Upload] = []
-        self.answers = UploadAnswers(ground, missions.mission_type)
+        self.answers = UploadAnswers(ground, missions.mission_type, are_kept=missions.are_kept)
         #: The time of the next `tick`, or infinity without an upload or an answer to repeat.
         self.due = inf
 

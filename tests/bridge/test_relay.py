@@ -125,6 +125,7 @@ def test_a_list_crosses_the_link_as_a_whole_and_is_acknowledged_when_the_vehicle
     assert bench.acks()[-1] == MissionResult.ACCEPTED
     texts = [message.text for _, message in bench.frames if message.get_type() == "STATUSTEXT"]
     assert any("0 not allowed" in text for text in texts)
+    assert not any("on the Pi" in text for text in texts)
     (count,) = bench.send(m.MAVLink_mission_request_list_message(*VEHICLE))
     assert count.count == 146
     (item,) = bench.send(m.MAVLink_mission_request_int_message(*VEHICLE, 145))
