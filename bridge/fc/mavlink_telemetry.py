@@ -74,9 +74,8 @@ class MavlinkReadings:
 
     def hear_attitude(self, message: Message, now: float, *, is_north_known: bool) -> None:
         roll, pitch, yaw = map(math.degrees, (message.roll, message.pitch, message.yaw))
-        if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
-            return
-        self.vehicle.hear(v.Orientation(now, v.Source.MAVLINK, roll, pitch, yaw % 360, is_north_known))
+        if all(abs(angle) <= 360 for angle in (roll, pitch, yaw)):  # NaN is not
+            self.vehicle.hear(v.Orientation(now, v.Source.MAVLINK, roll, pitch, yaw % 360, is_north_known))
 
     def gps_raw_int(self, message: Message, now: float) -> None:
         if message.fix_type != m.GPS_FIX_TYPE_NO_GPS:

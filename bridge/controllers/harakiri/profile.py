@@ -4,7 +4,6 @@
 Disarmed it speaks MSP. Armed, the setting tele_prot decides: MSP (0), FrSky telemetry (1) or MAVLink (2, 3).
 """
 
-import math
 from dataclasses import replace
 
 from bridge.controllers.harakiri.check import HarakiriRules
@@ -31,7 +30,7 @@ from protocols.msp.mission_flight import SUMMARY, decode_summary
 from protocols.msp.telemetry import Sensor
 from protocols.rights.msp import Firmware
 
-_STICKS, _MAX_RSSI = 4, 255
+_STICKS, _MAX_RSSI, _MOST_M = 4, 255, 1e6
 
 
 class HarakiriReadings(MavlinkReadings):
@@ -87,7 +86,7 @@ class HarakiriReadings(MavlinkReadings):
             self.vehicle.hear(v.GlobalPosition(now, v.Source.MAVLINK, *place, *velocity_m_s))
 
     def _vfr_hud(self, message: Message, now: float) -> None:
-        if math.isfinite(message.alt) and math.isfinite(message.climb):
+        if abs(message.alt) < _MOST_M and abs(message.climb) < _MOST_M:  # NaN is not
             self.vehicle.hear(v.Height(now, v.Source.MAVLINK, message.alt, message.climb))
 
     def rc_channels(self, message: Message, now: float) -> None:
