@@ -54,10 +54,11 @@ def open_database(path: Path, now: float) -> tuple[sqlite3.Connection, Path | No
     except OSError as error:
         raise StoreError(f"{failure}: its directory cannot be created ({reason(error)})") from error
     with explained(failure), ExitStack() as undo:
+        is_emptied = path.exists() and path.stat().st_size < 2  # as by a file system's repair: SQLite takes it for new
         connection = _connect(path)
         undo.callback(connection.close)
         aside = None
-        if not _make_ready(connection):
+        if is_emptied or not _make_ready(connection):
             # Moved before it is closed: closing would write the log into the damaged file and delete it.
             aside = _keep_aside(path, now)
             connection.close()
