@@ -143,6 +143,7 @@ def _ended_with(bench: Bench, most: int) -> str | None:
 
 
 def test_a_second_write_right_after_the_radius_waits_for_the_flash(bench: Bench) -> None:
+    until(lambda: bench.daemon.has_logged("settings.read"), "the board's settings, which connecting reads")
     planner = bench.mission_planner()
     planner.connect()
     planner.write(plain_plan(12))
