@@ -86,7 +86,8 @@ def test_a_daemon_survives_events_and_attacks_at_full_rate(
     assert max(monitor.gaps_s) <= LONGEST_GAP_S
     # A station that has left keeps its socket until another one connects.
     assert max(descriptors) - min(descriptors) <= 32, report
-    assert memory_kb[-1] - memory_kb[0] <= MEMORY_KB, report
+    # The first board's part loads code and fills SQLite's cache.
+    assert memory_kb[-1] - memory_kb[1] <= MEMORY_KB, report
     assert "Traceback" not in daemon.printed
     assert [entry for entry in daemon.events() if entry["level"] == "error"] == []
     assert daemon.is_alive
