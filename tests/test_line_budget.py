@@ -11,7 +11,7 @@ import pytest
 _ROOT = Path(__file__).resolve().parents[1]
 _SUFFIXES = {".py", ".js", ".css", ".html"}
 _INSTALLED = ("bridge", "protocols", "service", "storage", "fleet", "payloads", "terminal", "reports")
-#: Raised twice: the texts for pilots are in a table of their own (bridge/voice), and what comes from a vehicle of the
+#: Raised twice: the texts for pilots are in a table of their own (bridge/voice), and data from a vehicle of the
 #: fleet, a board or the state folder is bounded where it is read.
 CEILINGS = {_INSTALLED: 41_920, ("bridge",): 17_782}
 
