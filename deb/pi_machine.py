@@ -242,6 +242,7 @@ class Pi:
         self._folder, self._board = folder, board
         self._qemu: subprocess.Popen[bytes] | None = None
         self._card: Card
+        self._plugged_in_at = 0.0
         self.ports = {"ssh": 0, "gcs": 0, "page": 0}
         self.speeds: list[int] = []
         files = CACHE / "bare"
@@ -270,7 +271,7 @@ class Pi:
 
     def power(self, card: Card) -> None:
         """Plug the Pi in. Its first restart ends it, as a pull of the plug does."""
-        self._card = card
+        self._card, self._plugged_in_at = card, time.time()
         tree, words, is_mini = self._load(card)
         pins, trace = self._folder / "header", self._folder / "trace"
         trace.write_bytes(b"")
@@ -313,6 +314,11 @@ class Pi:
 
     def is_off(self) -> bool:
         return self._qemu is None or self._qemu.poll() is not None
+
+    def is_stuck(self) -> bool:
+        """Whether it is on, and has written nothing to its card for ten minutes."""
+        written_at = max(self._plugged_in_at, self._card.image.stat().st_mtime)
+        return not self.is_off() and time.time() - written_at > 600
 
     def run(self, script: str) -> str:
         """Run a shell script on the Pi; returns its output."""
