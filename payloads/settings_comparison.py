@@ -3,13 +3,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 
+from protocols.float32 import single
 from protocols.param_file import MOST_SETTINGS, is_equal, is_setting_name
 
 #: By name. A text where the setting is one.
 SettingValues = Mapping[str, float | str]
-#: More than any setting. Single precision ends here.
-_MOST = 3e38
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def setting_values(data: object) -> SettingValues:
         raise ValueError(f"settings must be at most {MOST_SETTINGS}: no flight controller has more")
     data = {name: value for name, value in data.items() if value is not None and is_setting_name(name)}
     for name, value in data.items():
-        is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
+        is_number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(single(value))
         if not is_number and not isinstance(value, str):
             raise ValueError(f"the setting {name} must be a number or text")
     return {name: value if isinstance(value, str) else float(value) for name, value in data.items()}

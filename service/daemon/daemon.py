@@ -262,14 +262,14 @@ class Daemon:
         ControlError if an error in the bridge ends it.
         """
         future: asyncio.Future[T] = self._loop.create_future()
-        self._answers.add(future)
-        future.add_done_callback(self._answers.discard)
 
         def done(result: T) -> None:
             if not future.done():  # the client may have disconnected
                 future.set_result(result)
 
         start(done, self._loop.time())
+        self._answers.add(future)
+        future.add_done_callback(self._answers.discard)
         self.flush()
         return await future
 
