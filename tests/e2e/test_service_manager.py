@@ -7,6 +7,7 @@ import signal
 import socket
 from dataclasses import asdict
 from pathlib import Path
+from typing import TextIO
 
 import pytest
 
@@ -23,6 +24,8 @@ from tests.support.programs import TIMEOUT_S, until
 from tests.support.programs import Daemon as DaemonProgram
 
 _LONG = plain_plan(146)
+#: 146 records take four seconds then: the push has not ended when a test interferes.
+_SLOWLY = ("--baud", "9600")
 
 
 class BugError(Exception):
@@ -44,21 +47,22 @@ async def test_a_bug_does_not_prevent_a_stop(tmp_path: Path, monkeypatch: pytest
     assert running.exception() is None
 
 
-def push_begun(daemon: DaemonProgram, plan: list[PlanRow] = _LONG) -> socket.socket:
-    """Push a list like the command line; return the connection once the board has part of it."""
-    connection = socket.socket(socket.AF_UNIX)
-    connection.settimeout(TIMEOUT_S)
-    connection.connect(str(daemon.state_dir / "control.sock"))
+def push_begun(daemon: DaemonProgram, plan: list[PlanRow] = _LONG, confirmed: int = 1) -> TextIO:
+    """Push a list like the command line; return the further answers once the board has so many records of it."""
     items = [asdict(item) for item in as_items(plan)]
-    connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")
-    while b"progress" not in connection.recv(4096):
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.settimeout(TIMEOUT_S)
+        connection.connect(str(daemon.state_dir / "control.sock"))
+        connection.sendall(json.dumps({"do": "push", "source": "test", "items": items}).encode() + b"\n")
+        answers = connection.makefile()  # which keeps it open
+    while json.loads(answers.readline()).get("progress", 0) < confirmed:
         pass
-    return connection
+    return answers
 
 
-def last_answer(connection: socket.socket) -> dict[str, dict[str, object]]:
-    with connection, connection.makefile() as lines:
-        answer: dict[str, dict[str, object]] = json.loads(list(lines)[-1])
+def last_answer(answers: TextIO) -> dict[str, dict[str, object]]:
+    with answers:
+        answer: dict[str, dict[str, object]] = json.loads(list(answers)[-1])
         return answer
 
 
@@ -71,9 +75,9 @@ def outcomes(start: Starter, daemon: DaemonProgram) -> list[str]:
 
 def test_a_push_close_to_the_end_is_finished(start: Starter) -> None:
     bench = start.bench()
-    connection = push_begun(bench.daemon)
+    answers = push_begun(bench.daemon, confirmed=120)
     assert bench.daemon.end() == 0
-    assert last_answer(connection)["result"]["ack"] == "MAV_MISSION_ACCEPTED"
+    assert last_answer(answers)["result"]["ack"] == "MAV_MISSION_ACCEPTED"
     assert bench.board.records() == records_of(judge(_LONG))
     assert outcomes(start, bench.daemon) == ["VERIFIED"]
 
@@ -81,15 +85,15 @@ def test_a_push_close_to_the_end_is_finished(start: Starter) -> None:
 @pytest.mark.parametrize("trouble", ["slow", "deaf"])
 def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) -> None:
     """The old list is kept, the sender is told, the outcome is stored, and systemd waits at most 2 s."""
-    bench = start.bench(*(("--baud", "9600", "--capacity", "500") if trouble == "slow" else ()))
+    bench = start.bench(*_SLOWLY, *(("--capacity", "500") if trouble == "slow" else ()))
     bench.daemon.push(plain_plan(5))
     old = bench.board.records()
-    connection = push_begun(bench.daemon, plain_plan(490) if trouble == "slow" else _LONG)
+    answers = push_begun(bench.daemon, plain_plan(490) if trouble == "slow" else _LONG)
     if trouble == "deaf":
         bench.board.set("hang 10")
     # Neither push can finish within 2 s, so the result shows that the daemon did not wait.
     assert bench.daemon.end() == 0
-    answer = last_answer(connection)["result"]
+    answer = last_answer(answers)["result"]
     assert answer["ack"] == "MAV_MISSION_DENIED"
     assert "old one kept" in str(answer["text"]) or trouble == "deaf"
     assert outcomes(start, bench.daemon) == ["FAILED", "VERIFIED"]
@@ -99,13 +103,13 @@ def test_a_push_that_would_take_long_is_aborted(start: Starter, trouble: str) ->
 
 
 def test_a_second_signal_does_not_wait(start: Starter) -> None:
-    bench = start.bench()
-    connection = push_begun(bench.daemon)
+    bench = start.bench(*_SLOWLY)
+    answers = push_begun(bench.daemon)
     bench.board.set("hang 10")
     bench.daemon.process.send_signal(signal.SIGINT)
     until(lambda: bench.daemon.has_logged("daemon.stopping"), "the first signal")
     assert bench.daemon.end(signal.SIGINT) == 0
-    connection.close()
+    answers.close()
     assert "Traceback" not in bench.daemon.printed
 
 
