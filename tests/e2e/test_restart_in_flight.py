@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The daemon is killed in flight and started again: no ground station sees the craft disarmed, or in another mode."""
 
-import time
+import json
+from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as m
 
@@ -22,15 +23,20 @@ def _heartbeats(station: PlainStation, count: int) -> set[tuple[bool, int]]:
     return seen
 
 
+def _remembers_the_mode(file: Path) -> bool:
+    return file.exists() and json.loads(file.read_text())["flight"]["mode"] == "LOITER"
+
+
 def test_the_craft_stays_armed_and_in_the_mode(start: Starter) -> None:
     bench = start.bench("--tele-prot", "2")
     bench.board.set("boxes 128")
-    time.sleep(2)  # the switch ranges are polled
+    until(lambda: (bench.daemon.status() or {}).get("mode") == "LOITER", "the mode")
     bench.board.set("armed 1")
     bench.daemon.wait("MAVLink")
     with udp_station(bench.daemon.address) as station:
         until(lambda: _heartbeats(station, 1) == {(True, LOITER)}, "the flight")
-        until((bench.daemon.state_dir / FLIGHT_FILE).exists, "the memory")
+        # It is written again when the mode changes.
+        until(lambda: _remembers_the_mode(bench.daemon.state_dir / FLIGHT_FILE), "the memory")
         bench.daemon.kill_and_restart()
         bench.daemon.wait_up()
     with udp_station(bench.daemon.address) as station:
