@@ -61,6 +61,8 @@ def test_settings_that_the_new_firmware_has_forgotten_are_restored(start: Starte
 
 def test_after_an_unplugged_cable_the_board_waits_and_the_backup_leads_back(flashing: FlashingBench) -> None:
     board = flashing.bench.board
+    # Writing and verifying it takes ten seconds after the backup.
+    flashing.image.write_bytes(stand_in(patched=True).ljust(60_000, b"\x5a"))
     program = flashing.begin("flash", str(flashing.image), "--battery")
     assert happens(lambda: bool(flashing.backups), _LONGEST_S), program.printed
     board.set("unplug")
