@@ -61,7 +61,7 @@ def test_a_vehicle_publishes_only_under_its_own_name(enrolled: Enrolled) -> None
     owl, pilot = enrolled.open("owl"), enrolled.open("pilot")
     queryables = [
         owl.declare_queryable(key, replies_with("owl"))
-        for key in ("fleet/owl/v1/state", "fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/upload")
+        for key in ("fleet/kite/v1/state", "fleet/kite/@cmd/v1/mission/upload", "fleet/owl/v1/state")
     ]
     until(lambda: replies(pilot, "fleet/owl/v1/state") == ["owl"], "its own state")
     assert replies(pilot, "fleet/kite/v1/state") == replies(pilot, "fleet/kite/@cmd/v1/mission/upload") == []
@@ -77,9 +77,9 @@ def test_a_vehicle_publishes_only_under_its_own_name(enrolled: Enrolled) -> None
 
 def test_a_guest_may_only_read(enrolled: Enrolled) -> None:
     kite, guest, pilot = enrolled.open("kite"), enrolled.open("guest"), enrolled.open("pilot")
-    taken: list[str] = []
+    taken: list[tuple[str, str]] = []
     inputs = [
-        kite.declare_subscriber(key, lambda sample: taken.append(str(sample.key_expr)))
+        kite.declare_subscriber(key, lambda sample: taken.append((str(sample.key_expr), sample.payload.to_string())))
         for key in ("fleet/kite/@mavlink/v1/in", "fleet/kite/v1/event")
     ]
     queryables = [
@@ -95,8 +95,10 @@ def test_a_guest_may_only_read(enrolled: Enrolled) -> None:
     token = guest.liveliness().declare_token("fleet/ghost/v1/alive/1")
     guest.put("fleet/kite/@mavlink/v1/in", "disarm")
     guest.put("fleet/kite/v1/event", "{}")
+    # The answer to a question after them shows that the router has handled them.
+    assert replies(guest, "fleet/kite/v1/state") == ["kite"]
     until(lambda: (pilot.put("fleet/kite/@mavlink/v1/in", "hello"), taken)[1], "the pilot's frame")
-    assert set(taken) == {"fleet/kite/@mavlink/v1/in"}
+    assert set(taken) == {("fleet/kite/@mavlink/v1/in", "hello")}
     assert replies(pilot, "fleet/kite/v1/mission/current") == []
     assert not [each for each in pilot.liveliness().get("fleet/ghost/**") if each.ok]
     del inputs, queryables, looks, forged, token
