@@ -123,6 +123,7 @@ def test_replayed_frames_are_refused_even_after_a_restart(keyed: SignedBench) ->
     assert keyed.board.records() == stored
     # The pilot continues and accepts the new daemon's signed frames.
     assert pilot.upload(plain_plan(4)) is MissionResult.ACCEPTED
+    assert keyed.daemon.end() == 0
     assert_key_is_not_leaked(keyed)
 
 
