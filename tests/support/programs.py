@@ -262,7 +262,8 @@ class Daemon(Program):
         self.process = self._start()
 
     def events(self) -> list[dict[str, Any]]:
-        return [json.loads(line) for line in self.printed.splitlines() if line.startswith("{")]
+        whole, _, _ = self.printed.rpartition("\n")  # the last line may be half written
+        return [json.loads(line) for line in whole.splitlines() if line.startswith("{")]
 
     def has_logged(self, event: str) -> dict[str, Any] | None:
         """The last event of that name, None without one."""
