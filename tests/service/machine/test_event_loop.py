@@ -86,11 +86,12 @@ async def test_data_is_read_on_arrival(port: Port) -> None:
 
 
 async def test_held_data_is_read_together_once_the_time_has_come(port: Port) -> None:
-    until = port.loop.time() + 20 * INTERVAL_S
-    port.loop.lane.hold(until)
+    port.loop.lane.hold(port.loop.time() + HOUR_S)
     port.write(b"a")
     await asyncio.sleep(INTERVAL_S)
     port.write(b"b")
+    until = port.loop.time() + 20 * INTERVAL_S
+    port.loop.lane.hold(until)
     await until_async(lambda: port.reads, "the data")
     data, read_at = port.reads[0]
     assert data == b"ab"
