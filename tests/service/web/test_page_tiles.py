@@ -107,6 +107,7 @@ def test_the_browser_keeps_the_choice_and_says_why_there_are_no_tiles(browsers: 
         bench.tiles.reply = lambda *_: (200, {}, plain())
         page.open()
         page.wait_text("#map .map-credit", bench.tiles.host)
+        until(lambda: shown(page) == len(page.all("#map .map-tiles img")), "all tiles")
         assert violations(page) == []
         page.press("#tiles-on")
         until(lambda: not page.all("#map .map-tiles img"), "the plain ground")
