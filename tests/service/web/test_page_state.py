@@ -28,7 +28,7 @@ def test_the_state_bar_stays_visible(browsers: Browsers, web: WebBench) -> None:
         web.board.set("armed 1")
         until(lambda: page.text("#badges") == "ARMED", "the armed craft")
         red = page.run("return getComputedStyle(document.querySelector('.badge')).backgroundColor")
-        assert page.driver.title == "ARMED · naze-bridge"
+        until(lambda: page.driver.title == "ARMED · naze-bridge", "the title")
         assert page.text("#spoken") == "armed"
 
         web.board.set("unplug")

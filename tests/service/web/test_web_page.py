@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.chromium import LAPTOP, PHONE, TASKS, Browser, Browsers
 from tests.support.plan import plain_plan
-from tests.support.programs import run_naze_bridge
+from tests.support.programs import run_naze_bridge, until
 from tests.support.take_pictures import PICTURES, take_pictures
 from tests.support.web_bench import WebBench, web_bench
 
@@ -57,7 +57,7 @@ def test_an_immediate_reload_loads_every_file(page: Browser) -> None:
 
 
 def test_the_overview_has_the_vehicles_values(page: Browser) -> None:
-    assert page.text("#badges") == "DISARMED"
+    until(lambda: page.text("#badges") == "DISARMED", "the craft")
     page.wait_text("#headline", "12.6 V")
     assert page.text("#headline") == "STABILIZE, 12.6 V, Harakiri with the mission extension"
     assert (page.value("State"), page.value("Mode")) == ("disarmed", "STABILIZE")
