@@ -9,6 +9,7 @@ from tests.support.doc_pages import PAGES, blocks, place_of, prose_of, spans, te
 from tests.support.programs import REPOSITORY
 
 CODE = ("bridge", "fleet", "payloads", "protocols", "reports", "service", "simulator", "storage", "terminal")
+GENERATED = ("build", "dist")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 #: What the blocks of each language are tested by.
 LANGUAGES = {
@@ -33,8 +34,8 @@ def _anchor(heading: str) -> str:
 
 @cache
 def files() -> set[str]:
-    """The names of the files in all folders."""
-    folders = [folder for folder in REPOSITORY.glob("[!.]*") if folder.is_dir()]
+    """The names of the files in all folders, but those that another test may be building meanwhile."""
+    folders = [folder for folder in REPOSITORY.glob("[!.]*") if folder.is_dir() and folder.name not in GENERATED]
     return {path.name for folder in folders for path in folder.rglob("*.*")} | {"CONTRIBUTING.md", "README.md"}
 
 
@@ -74,7 +75,7 @@ def test_files_in_the_text_exist() -> None:
     for page, span in ((each, span) for each in PAGES for span in spans(each)):
         folder = span.partition("/")[0]
         is_key = span.startswith("fleet/") and not span.endswith(("/", ".py"))  # of zenoh, under the default prefix
-        is_source = folder not in ("", "build", "dist") and (REPOSITORY / folder).is_dir()
+        is_source = folder not in ("", *GENERATED) and (REPOSITORY / folder).is_dir()
         if is_source and "/" in span and " " not in span and not is_key:
             assert (REPOSITORY / span).exists() or (page.parent / span).exists(), (place_of(page), span)
         elif re.fullmatch(r"[\w-]+\.(py|c|h|md)", span):
