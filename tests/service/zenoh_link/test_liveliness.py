@@ -45,4 +45,5 @@ def test_two_vehicles_with_one_name_both_report_it(start: Starter, tmp_path: Pat
             assert "another bridge has the same vehicle name" in refused["error"]
         assert first.board.records() == before
         second.end(signal.SIGKILL)
+        reader.samples.clear()
         reader.wait("state", lambda state: state["others_of_this_name"] == 0)
