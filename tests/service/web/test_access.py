@@ -173,7 +173,7 @@ def test_a_huge_body_is_refused_unread(shared_web: WebBench, head: bytes) -> Non
     chunk = b"100000\r\n" + bytes(1 << 20) + b"\r\n"
     start = b"POST %b HTTP/1.1\r\nHost: a\r\nAuthorization: Bearer %b\r\n%b\r\n\r\n"
     answer = raw(shared_web, start % (RESTORE.encode(), shared_web.token.encode(), head), *[chunk] * 64)
-    assert answer.startswith((b"HTTP/1.1 413", b""))
+    assert not answer or answer.startswith(b"HTTP/1.1 413")
     assert shared_web.state()["write"] is None
     assert resident_kb(shared_web.daemon.process.pid) - before < 8 << 10
 
