@@ -46,7 +46,8 @@ def test_events_and_reports_survive_a_router_that_hangs_and_dies(start: Starter,
         assert [len(each["sent"]) for each in reports] == list(range(4, 10))
         assert [each["seq"] for each in reports] == list(range(6))
         until(lambda: sum(each["event"] == "mission.push_ended" for each in events) == 6, "all events")
-        assert [each["seq"] for each in events] == list(range(len(events)))
+        numbers = [each["seq"] for each in events]  # others may follow
+        assert numbers == list(range(len(numbers)))
         del subscribers
     status = bench.daemon.status()
     assert status is not None
