@@ -32,6 +32,9 @@ def _use(fleet: Fleet, tmp_path: Path) -> None:
     ):
         assert "2 vehicles are at" in program.printed
         planner.skip_connecting()
+        planner.wait_until(
+            lambda: {message.get_srcSystem() for message in planner.messages("HEARTBEAT")} == {1, 2}, "both vehicles"
+        )
         plans = {"kite": (1, plain_plan(20, start=3)), "crow": (2, plain_plan(30, start=60))}
         for name, (sysid, plan) in plans.items():
             planner.vehicle = sysid, 1
@@ -40,9 +43,6 @@ def _use(fleet: Fleet, tmp_path: Path) -> None:
         for sysid, plan in plans.values():
             planner.vehicle = sysid, 1
             assert len(planner.read()) == len(plan)
-        planner.wait_until(
-            lambda: {message.get_srcSystem() for message in planner.messages("HEARTBEAT")} == {1, 2}, "both vehicles"
-        )
         fleet.start("owl", commands=_COMMANDS, sysid=2)
         until(lambda: "owl and crow both have system id 2" in program.printed, "the clash")
         assert "owl is left out" in program.printed

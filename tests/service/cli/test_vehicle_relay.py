@@ -51,6 +51,7 @@ def test_mission_planner_writes_and_reads_a_mission(fleet: Fleet, tmp_path: Path
         MissionPlanner(address, listen=kind == "udpout") as planner,
     ):
         planner.skip_connecting()
+        planner.wait_until(lambda: bool(planner.messages("HEARTBEAT")), "the vehicle")
         plan = plain_plan(20, start=3)
         planner.write(plan)
         assert fleet.daemons["kite"].pull()["records"] == records_of(judge(plan))
