@@ -10,8 +10,17 @@ import pytest
 from bridge.gcs.station import Peer
 from service.links.gcs_links import GcsLink, LinkError
 from tests.service.links.test_gcs_links import FRAME
-from tests.support.links import Links, received
-from tests.support.programs import free_port, until_async
+from tests.support.links import Links
+from tests.support.programs import TIMEOUT_S, free_port, until_async
+
+
+async def reply_from(port: int, client: socket.socket) -> tuple[bytes, Any]:
+    """The next datagram from this port. Another test's program may still send to the client's port."""
+    async with asyncio.timeout(TIMEOUT_S):
+        while True:
+            data, sender = await asyncio.get_running_loop().sock_recvfrom(client, 4096)
+            if sender[1] == port:
+                return data, sender
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
@@ -25,27 +34,32 @@ async def test_udpin_answers_to_the_senders_address(links: Links, host: str) -> 
     for (peer, data), client in zip(links.events.received, clients, strict=True):
         assert data == FRAME
         link.send(peer, str(peer).encode())
-        assert await received(client) == str(peer).encode()
+        data, _ = await reply_from(port, client)
+        assert data == str(peer).encode()
 
 
 async def test_a_network_that_is_down_loses_only_the_datagram(links: Links) -> None:
-    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
+    port = free_port(socket.SOCK_DGRAM)
+    link = links.open(f"udpin:127.0.0.1:{port}")
     client = links.udp()
     for unreachable in (("192.0.2.1", 14550), ("255.255.255.255", 14550), ("127.0.0.1", 0)):
         # From a socket bound to loopback: ENETUNREACH or EINVAL; EACCES; EINVAL.
         link.send(Peer(link.name, unreachable), FRAME)
     link.send(Peer(link.name, client.getsockname()), bytes(70000))
     link.send(Peer(link.name, client.getsockname()), FRAME)
-    assert await received(client) == FRAME
+    data, _ = await reply_from(port, client)
+    assert data == FRAME
 
 
 async def test_datagrams_to_a_closed_port_do_not_block(links: Links) -> None:
-    link = links.open(f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
+    port = free_port(socket.SOCK_DGRAM)
+    link = links.open(f"udpin:127.0.0.1:{port}")
     deaf, client = links.udp(), links.udp()
     for _ in range(5000):
         link.send(Peer(link.name, deaf.getsockname()), bytes(280))
     link.send(Peer(link.name, client.getsockname()), FRAME)
-    assert await received(client) == FRAME
+    data, _ = await reply_from(port, client)
+    assert data == FRAME
 
 
 async def connected(links: Links, link: GcsLink, client: socket.socket, address: tuple[str, int]) -> Peer:
@@ -56,14 +70,6 @@ async def connected(links: Links, link: GcsLink, client: socket.socket, address:
     await until_async(lambda: peer in link._own, "the station's socket")  # type: ignore[attr-defined]
     links.events.received.clear()
     return peer
-
-
-async def reply_from(port: int, client: socket.socket) -> tuple[bytes, object]:
-    """The next datagram from this port. Another test's program may still send to the client's port."""
-    while True:
-        data, sender = await asyncio.get_running_loop().sock_recvfrom(client, 4096)
-        if sender[1] == port:
-            return data, sender
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
@@ -92,7 +98,7 @@ async def test_replies_leave_from_the_address_that_the_station_sends_to(links: L
     client = links.udp(host)
     peer = await connected(links, link, client, (to, port))
     link.send(peer, FRAME)
-    _, sender = await asyncio.get_running_loop().sock_recvfrom(client, 4096)
+    _, sender = await reply_from(port, client)
     assert sender[:2] == (to, port)
 
 
@@ -139,7 +145,8 @@ async def test_a_station_whose_program_restarts_keeps_the_socket(links: Links) -
         again.sendto(b"again", ("127.0.0.1", port))
         await until_async(lambda: links.events.received, "its datagram")
         link.send(peer, FRAME)
-        assert await received(again) == FRAME
+        data, _ = await reply_from(port, again)
+        assert data == FRAME
 
 
 async def test_the_socket_of_a_station_that_has_left_is_closed_when_another_connects(links: Links) -> None:
