@@ -216,12 +216,14 @@ class Daemon(Program):
         return stations
 
     def wait(self, state: str = "MSP") -> None:
-        """Wait until the flight controller is found."""
+        """Wait until the flight controller is found, and over MSP until its first status is here."""
 
         def arrived() -> bool:
             assert self.is_alive, self.printed
             status = self.status()
-            return status is not None and status["state"] == state
+            if status is None or status["state"] != state:
+                return False
+            return state != "MSP" or status["armed"] is not None
 
         until(arrived, f"a daemon in state {state}")
 
