@@ -275,9 +275,11 @@ _PIECE = 256 << 10
 
 def updates(pi: Pi, plug: Plug, pulls: int) -> None:
     """The plug is pulled during the page's update and the way back: missions and settings are kept."""
-    token, package = token_of(pi), NEWER_PACKAGE.read_bytes()
-    for start in range(0, len(package), _PIECE):
-        fetch(pi, f"/api/pi/package?start={start}", token, package[start : start + _PIECE])
+    token = token_of(pi)
+    try:
+        send_package(pi, token)
+    except HTTPError:  # the bridge has restarted for the last save: it asks for the first piece again
+        send_package(pi, token)
     for action, wanted in (("install", NEWER), ("downgrade", "0.")):
         said = ask_page(pi, token, {"action": action})
         check(said["version"].startswith(wanted), f"the page announces another version: {said}")
@@ -293,6 +295,12 @@ def updates(pi: Pi, plug: Plug, pulls: int) -> None:
             check(gcs.write(mission(mark), lambda _: None) is MissionResult.ACCEPTED, f"not accepted: {gcs.texts}")
         plug.done = replace(plug.done, marks=plug.done.marks | {mark})
         plug.pull(lambda: plug.done)
+
+
+def send_package(pi: Pi, token: str) -> None:
+    package = NEWER_PACKAGE.read_bytes()
+    for start in range(0, len(package), _PIECE):
+        fetch(pi, f"/api/pi/package?start={start}", token, package[start : start + _PIECE])
 
 
 def start_again(pi: Pi, plug: Plug) -> None:
