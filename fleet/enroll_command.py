@@ -51,6 +51,7 @@ def enroll(name: str, role: str, folder: Path, prefix: str, router: str) -> None
     if role == Role.VEHICLE.value:
         sysid = "" if enrolled.member.sysid is None else f"sysid = {enrolled.member.sysid}\n\n"
         table = f'[zenoh]\nvehicle = "{name}"\nconfig_file = "{enrolled.files[0].name}"'
+        table += "\n# For pilots to push missions and settings, and to fetch logs:\n# commands = true"
         click.echo(f"In its configuration file:\n\n{sysid}{table}")
         if not sysid:
             click.echo(f"\nAll {len(SYSIDS)} system ids are in use: it does not get one.")
