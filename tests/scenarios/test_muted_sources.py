@@ -167,6 +167,7 @@ class Sinks:
         gauges = {name: value for name, (_, value) in vehicle_gauges(report).items()}
         overview = plain(overview_of(state))
         bridge = BridgeId("naze-1", "1")
+        lists: list[FleetVehicle] = [vehicle_of(bridge, state), vehicle_of(bridge, state_of(overview))]
         for name in VALUES:
             value = _part(state, name)
             self.is_right(name, value)
@@ -175,7 +176,6 @@ class Sinks:
             if name in MEASURED:
                 assert gauges[MEASURED[name]] == value, name
             if name in LISTED:
-                lists: list[FleetVehicle] = [vehicle_of(bridge, state), vehicle_of(bridge, state_of(overview))]
                 for listed in lists:
                     shown = getattr(listed, LISTED[name])
                     assert (shown is None) == (value is None), (name, shown, value)
