@@ -317,8 +317,10 @@ class Pi:
 
     def is_stuck(self) -> bool:
         """Whether it is on, and has written nothing to its card for ten minutes."""
+        if self.is_off():
+            return False
         written_at = max(self._plugged_in_at, self._card.image.stat().st_mtime)
-        return not self.is_off() and time.time() - written_at > 600
+        return time.time() - written_at > 600
 
     def run(self, script: str) -> str:
         """Run a shell script on the Pi; returns its output."""
