@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The answers that end uploads: sent, reported as texts, and remembered for repeated items. Sans-IO."""
 
+from collections.abc import Collection
 from math import inf
 from typing import Any
 
@@ -18,8 +19,8 @@ from reports.verdict import Result, Verdict
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
 #: These never ask for the final ack again, so it is sent four times. Not later: QGroundControl's user takes 0.1 s to
-#: begin the next transfer, whose end a stale ack would be.
-_NEVER_ASK = Kind.QGROUNDCONTROL, Kind.MAVSDK
+#: begin the next transfer, whose end a stale ack would be. MAVSDK's script begins it at once: only if items were lost.
+NEVER_ASK = {False: (Kind.QGROUNDCONTROL,), True: (Kind.QGROUNDCONTROL, Kind.MAVSDK)}
 _ACK_AGAIN_S = (0.02, 0.04, 0.06)
 _ACK_LATE_S = 0.02
 #: An item that arrives sooner after the final ack was sent before it, and does not show that it was lost.
@@ -51,16 +52,16 @@ class UploadAnswers:
         mission_type: int | None = None,
         *,
         is_cancelled: bool = False,
-        is_repeated: bool = False,
+        again_to: Collection[Kind] = (),
     ) -> None:
         """Send the final MISSION_ACK of an upload of `count` items, or 0 for a clear.
 
         A Cancel after a refusal, or after one that came too late (`is_cancelled`), gets the same answer: it must not
-        clear the mission. `is_repeated`: send it again until the station sends another mission message.
+        clear the mission. `again_to`: these get it again until they send another mission message.
         """
         cancel_s = _CANCEL_S if count and (is_cancelled or ack is not MissionResult.ACCEPTED) else 0.0
         answer = FinalAck(ack, count, now, now + cancel_s)
-        if is_repeated and count and sender.station.behaviour.kind in _NEVER_ASK:
+        if again_to and count and sender.station.behaviour.kind in again_to:
             answer.again = [now + later_s for later_s in _ACK_AGAIN_S]
             self._again.append((sender, answer))
             self.due = min(self.due, answer.again[0])

@@ -23,7 +23,7 @@ from bridge.model.events import Emit, UploadEnded, UploadRefused, UploadStarted
 from bridge.model.missions import ArrivedMission, Refusal
 from bridge.transfers.arriving_list import WholeList
 from bridge.transfers.downloads import MissionDownloads
-from bridge.transfers.upload_answers import UploadAnswers
+from bridge.transfers.upload_answers import NEVER_ASK, UploadAnswers
 from bridge.transfers.upload_states import (
     TRANSITIONS,
     Arrived,
@@ -198,6 +198,7 @@ class MissionUploads:
                 if state.received or isinstance(state, Delivering):
                     # Without items, a station there may have started again, and would take it for its own list's.
                     self._follow(upload, now)
+                upload.has_losses |= isinstance(state, Receiving)
                 self._request(upload, *state.repeats(now))
         self.answers.tick(now)
         for upload in self._within(Waiting, Complete):
@@ -223,8 +224,7 @@ class MissionUploads:
             sender.say(_TOO_MANY_UPLOADS.why)
             self.answers.end(sender, _TOO_MANY_UPLOADS.ack, 0, now, mission_type)
             return
-        number = sender.number
-        upload = Upload(sender, count, mission_type, now, number)
+        upload = Upload(sender, count, mission_type, now, sender.number)
         self._uploads.append(upload)
         self.due = 0.0
         armed = self._missions.armed_refusal()
@@ -318,10 +318,9 @@ class MissionUploads:
             self._handle(upload, Ended(delivery), now)
             return
         accepted = delivery.ack is MissionResult.ACCEPTED
-        shown = with_meant_home(verdict) if upload.is_write_fast else verdict
         if accepted and upload.is_part:
             upload.sender.say(sentences.PART_OF_LAST())
-        self.answers.report(upload.sender, shown, delivery)
+        self.answers.report(upload.sender, with_meant_home(verdict) if upload.is_write_fast else verdict, delivery)
         if upload in self._uploads:
             self._answer(upload, delivery.ack, now)
             self._handle(upload, Delivered(), now)
@@ -370,13 +369,13 @@ class MissionUploads:
         state = upload.state
         if isinstance(state, DeliveringUnanswered):
             return
-        is_cancelled, is_repeated = isinstance(state, DeliveringDespiteCancel), isinstance(state, Delivering)
+        is_cancelled = isinstance(state, DeliveringDespiteCancel)
+        again_to = NEVER_ASK[upload.has_losses] if isinstance(state, Delivering) else ()
         to, count, kind = upload.sender, upload.count, upload.mission_type
-        self.answers.end(to, ack, count, now, kind, is_cancelled=is_cancelled, is_repeated=is_repeated)
+        self.answers.end(to, ack, count, now, kind, is_cancelled=is_cancelled, again_to=again_to)
 
     def _emit_refusal(self, upload: Upload, refusal: Refusal) -> None:
-        name, ack = str(upload.sender), refusal.ack.name
-        self._emit(UploadRefused(station=name, ack=ack, why=refusal.text))
+        self._emit(UploadRefused(station=str(upload.sender), ack=refusal.ack.name, why=refusal.text))
 
 
 def _is_part(items: Sequence[MissionItem], before: Sequence[MissionItem]) -> bool:

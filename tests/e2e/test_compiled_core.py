@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from mavsdk.asyncio.plugins.mavlink_direct.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 
-from tests.e2e.test_mavsdk import Missions, fields, raw_items, vehicle_at
+from tests.e2e.test_mavsdk import fields, raw_items, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.c_core import library
 from tests.support.plan import expected_fields, judge, mixed_plan, records_of
@@ -33,7 +34,7 @@ async def test_146_items_are_written_and_read_back(core: tuple[Bench, Path]) -> 
     (bench, flash), plan = core, mixed_plan(146)
     board, records = bench.board, records_of(judge(plan))
     async with vehicle_at(bench.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         await missions.upload_mission(raw_items(plan))
         assert board.records() == records
         assert sealed_slots(flash, records) == 1

@@ -6,7 +6,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from mavsdk.asyncio.plugins.mission_raw import MissionRawError
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawError
 
 from bridge.controllers.nav.check import NavRules
 from bridge.controllers.nav.rules import NavProfile
@@ -15,7 +15,7 @@ from protocols.mission_item import Command, Frame
 from protocols.msp.nav import NavRecord
 from reports.verdict import Verdict
 from simulator.inav.boxes import BOXES, NAV_WP
-from tests.e2e.test_mavsdk import Missions, fields, pressed_again, raw_items, refusal_of, vehicle_at
+from tests.e2e.test_mavsdk import fields, pressed_again, raw_items, refusal_of, vehicle_at
 from tests.support.benches import Bench, Starter
 from tests.support.mavproxy import MavProxy
 from tests.support.mission_planner import MissionPlanner, UploadFailed
@@ -84,7 +84,7 @@ async def test_mavsdk_writes_and_reads_120_records(inav: Bench) -> None:
         assert stored(inav, 120) == records_of(plan)
 
     async with vehicle_at(inav.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         await missions.upload_mission(raw_items(plan))
         is_kept()
         read = await pressed_again(missions.download_mission, is_kept)
@@ -143,7 +143,7 @@ def test_mission_planner_shows_that_a_version_without_geozones_lacks_a_fence(sta
 
 async def test_mavsdk_writes_and_reads_a_fence_and_rally_points(inav: Bench) -> None:
     async with vehicle_at(inav.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         lists = [raw_items(plan) for plan in (FENCE, RALLY)]
         for kind, items in enumerate(lists, 1):
             for item in items:
@@ -167,7 +167,7 @@ async def test_mavsdk_and_mission_planner_set_the_waypoint_in_flight(inav: Bench
         planner.wait_until(is_current, f"item {seq}")
 
     async with vehicle_at(inav.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         plan = raw_items([HOME, *(waypoint(number, p2=0.0) for number in range(1, 5))])
         await pressed_again(lambda: missions.upload_mission(plan), lambda: None)
         with ExitStack() as landing:

@@ -23,6 +23,7 @@ from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
 from protocols.mission_item import Command
 from tests.support.benches import Bench, Starter
+from tests.support.lossy_udp import LossyUdp
 from tests.support.plan import (
     HOME,
     PlanRow,
@@ -37,22 +38,6 @@ from tests.support.plan import (
 from tests.support.programs import TIMEOUT_S, until
 
 T = TypeVar("T")
-#: A final ack is repeated for 0.08 s (bridge/transfers/upload_answers.py).
-_PAUSE_S = 0.3
-
-
-class Missions(MissionRawAsync):  # type: ignore[misc]  # the package has no types
-    """Begins the next transfer no sooner than its user can: it would take a repeated ack for the answer to that."""
-
-    async def upload_mission(self, mission_items: list[MissionItem]) -> None:
-        try:
-            await super().upload_mission(mission_items)
-        finally:
-            await asyncio.sleep(_PAUSE_S)
-
-    async def clear_mission(self) -> None:
-        await super().clear_mission()
-        await asyncio.sleep(_PAUSE_S)
 
 
 @asynccontextmanager
@@ -100,7 +85,7 @@ async def pressed_again(act: Callable[[], Awaitable[T]], after_failure: Callable
 async def test_a_written_list_is_read_back(shared: Bench, count: int) -> None:
     plan = mixed_plan(count)
     async with vehicle_at(shared.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         await missions.upload_mission(raw_items(plan))
         assert shared.board.records() == records_of(judge(plan))
         assert [fields(item) for item in await missions.download_mission()] == expected_fields(plan)
@@ -111,14 +96,14 @@ async def test_mavsdk_waits_while_a_list_is_written_slowly(start: Starter) -> No
     bench = start.bench("--baud", "9600")
     plan = mixed_plan(146)
     async with vehicle_at(bench.daemon.port) as vehicle:
-        await Missions(vehicle).upload_mission(raw_items(plan))
+        await MissionRawAsync(vehicle).upload_mission(raw_items(plan))
     assert bench.board.records() == records_of(judge(plan))
 
 
 async def test_unset_parameters_are_nan(shared: Bench) -> None:
     plan = [replace(row, p1=math.nan, p3=math.nan, p4=math.nan) for row in plain_plan(20, start=3)]
     async with vehicle_at(shared.daemon.port) as vehicle:
-        await Missions(vehicle).upload_mission(raw_items(plan))
+        await MissionRawAsync(vehicle).upload_mission(raw_items(plan))
     assert shared.board.records() == records_of(judge(plain_plan(20, start=3)))
 
 
@@ -131,7 +116,7 @@ async def test_a_list_is_written_and_read_over_a_bad_link(shared: Bench, kept: l
         assert shared.board.records() in (kept, new)
 
     async with vehicle_at(link.address[1]) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         await pressed_again(lambda: missions.upload_mission(raw_items(plan)), list_is_whole)
         assert shared.board.records() == new
         held = await pressed_again(missions.download_mission, list_is_whole)
@@ -141,21 +126,23 @@ async def test_a_list_is_written_and_read_over_a_bad_link(shared: Bench, kept: l
 
 
 async def test_a_refused_list_keeps_the_old_mission(shared: Bench) -> None:
-    async with vehicle_at(shared.daemon.port) as vehicle:
-        missions = Missions(vehicle)
-        plan = plain_plan(12, start=20)
-        await missions.upload_mission(raw_items(plan))
-        landing = [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]
-        assert await refusal_of(missions, landing) == MissionRawResult.INVALID_ARGUMENT
-        assert await refusal_of(missions, plain_plan(147)) == MissionRawResult.TOO_MANY_MISSION_ITEMS
-        assert await refusal_of(missions, [HOME, waypoint(1, frame=7)]) == MissionRawResult.UNSUPPORTED
-        assert shared.board.records() == records_of(judge(plan))
+    """Over a network that takes longer than the script to begin its next upload."""
+    with LossyUdp(shared.daemon.address, delay_s=0.03) as link:
+        async with vehicle_at(link.address[1]) as vehicle:
+            missions = MissionRawAsync(vehicle)
+            plan = plain_plan(12, start=20)
+            await missions.upload_mission(raw_items(plan))
+            landing = [HOME, PlanRow(Command.NAV_LAND), waypoint(1)]
+            assert await refusal_of(missions, landing) == MissionRawResult.INVALID_ARGUMENT
+            assert await refusal_of(missions, plain_plan(147)) == MissionRawResult.TOO_MANY_MISSION_ITEMS
+            assert await refusal_of(missions, [HOME, waypoint(1, frame=7)]) == MissionRawResult.UNSUPPORTED
+            assert shared.board.records() == records_of(judge(plan))
 
 
 async def test_clear_mission_and_clear_all_clear_the_board(shared: Bench) -> None:
     """Its clear_mission sends an ArduPilot a list of one item of zeros."""
     async with vehicle_at(shared.daemon.port) as vehicle:
-        missions = Missions(vehicle)
+        missions = MissionRawAsync(vehicle)
         plan = plain_plan(12, start=20)
         await missions.upload_mission(raw_items(plan))
         await missions.clear_mission()
@@ -174,7 +161,7 @@ async def test_long_texts_arrive_whole_and_once(shared: Bench) -> None:
     """MAVSDK joins the pieces of a STATUSTEXT with nothing in between: padding would be a gap."""
     texts: list[str] = []
     async with vehicle_at(shared.daemon.port) as vehicle, asyncio.timeout(TIMEOUT_S):
-        upload = asyncio.ensure_future(Missions(vehicle).upload_mission(raw_items(mixed_plan(20))))
+        upload = asyncio.ensure_future(MissionRawAsync(vehicle).upload_mission(raw_items(mixed_plan(20))))
         async for text in TelemetryAsync(vehicle).subscribe_status_text():
             texts.append(text.text)
             if texts[-1].startswith("WP 8: Yaw"):

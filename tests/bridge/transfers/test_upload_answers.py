@@ -4,7 +4,7 @@
 import pytest
 
 from bridge.transfers.upload_states import Delivering
-from protocols.mavlink.dialect import Message
+from protocols.mavlink.dialect import Message, messages
 from simulator.board.options import SimOptions
 from tests.support.conversations import ack_message, count_message, item_message, list_message, waypoints
 from tests.support.qgc_upload import QGC_HEARTBEAT
@@ -69,6 +69,19 @@ def test_the_final_ack_is_repeated_before_the_station_can_go_on(world: World, st
     first, *again = [at for at, message in station.received if message.get_type() == "MISSION_ACK"]
     assert len(again) == 3
     assert again[-1] < first + 0.1
+
+
+@pytest.mark.parametrize("lost", [0, 1])
+def test_mavsdk_gets_the_final_ack_again_only_if_the_link_loses_frames(
+    world: World, station: GroundStation, lost: int
+) -> None:
+    """A script begins its next upload at once, and a repeated ack would end that."""
+    station.send(messages.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    items = waypoints(8)
+    receiving(world, station, items, 7)
+    world.run(lost)
+    station.send(item_message(7, items[7]), wait_s=5)
+    assert len(acks(station)) == 1 + 3 * lost
 
 
 def test_a_final_ack_that_a_busy_machine_delays_is_not_repeated() -> None:

@@ -7,10 +7,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from mavsdk.asyncio.plugins.mission_raw import MissionRawResult
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync, MissionRawResult
 from mavsdk.asyncio.plugins.telemetry.telemetry import TelemetryAsync
 
-from tests.e2e.test_mavsdk import Missions, fields, raw_items, refusal_of, vehicle_at
+from tests.e2e.test_mavsdk import fields, raw_items, refusal_of, vehicle_at
 from tests.support.fleet_bench import Fleet
 from tests.support.mission_planner import MissionPlanner
 from tests.support.plan import expected_fields, judge, mixed_plan, plain_plan, records_of
@@ -62,7 +62,7 @@ async def test_mavsdk_works_through_zenoh(fleet: Fleet, tmp_path: Path) -> None:
     port, board = free_port(), fleet.boards["kite"]
     with relay(tmp_path, fleet, "kite", f"udpout:127.0.0.1:{port}"):
         async with vehicle_at(port, listen=True) as vehicle:
-            missions = Missions(vehicle)
+            missions = MissionRawAsync(vehicle)
             plan = mixed_plan(146)
             await missions.upload_mission(raw_items(plan))
             assert board.records() == records_of(judge(plan))
