@@ -57,9 +57,11 @@ async def until_async(condition: Callable[[], T | None], what: str) -> T:
 
 
 #: Above all default ports, and below 32768, where the kernel's own choices begin: one of those could take a port
-#: before the program under test does. Each test process starts at another port and repeats none before 12,000 others.
-_FIRST_PORT, _PORTS = 20_000, 12_000
-_ports = itertools.count(os.getpid() * 211)
+#: before the program under test does. Each worker has its own for a whole run: a program that another test has left, or
+#: that sends where no one listens, is not heard here.
+_FIRST_PORT, _PORTS, _PORTS_OF_A_WORKER = 20_000, 12_000, 1_500
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+_ports = itertools.count(_WORKER * _PORTS_OF_A_WORKER + os.getpid() % 500)
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = "127.0.0.1") -> int:
