@@ -419,25 +419,20 @@ def until_told(pi: Pi, card: Card, *texts: str) -> str:
     end = time.monotonic() + _FIRST_START_S
     while not any(text in (said := card.read(RESULT)) for text in texts):
         check(time.monotonic() < end, f"not told after {_FIRST_START_S} s: {texts}; the card says: {said}")
-        if has_ended(pi):
+        if pi.is_stuck():  # QEMU's Pi sometimes hangs in its restart
+            say("the Pi hangs: the plug is pulled")
+            pi.cut()
+        if pi.is_off():
             pi.power(card)
         time.sleep(1)
     return said
 
 
 def until_off(pi: Pi) -> None:
-    end = time.monotonic() + 1800
-    while not has_ended(pi):
+    end = time.monotonic() + 900
+    while not pi.is_off():
         check(time.monotonic() < end, "the Pi does not restart")
         time.sleep(1)
-
-
-def has_ended(pi: Pi) -> bool:
-    """Whether the Pi is off. QEMU's Pi sometimes hangs in its restart: then the plug is pulled, as its owner would."""
-    if pi.is_stuck():
-        say("the Pi hangs: the plug is pulled")
-        pi.cut()
-    return pi.is_off()
 
 
 def leaves_the_mini_uart(pi: Pi, naze: Naze) -> None:
