@@ -24,7 +24,8 @@ def _heartbeats(station: PlainStation, count: int) -> set[tuple[bool, int]]:
 
 
 def _remembers_the_mode(file: Path) -> bool:
-    return file.exists() and json.loads(file.read_text())["flight"]["mode"] == "LOITER"
+    flight = json.loads(file.read_text())["flight"] if file.exists() else None
+    return flight is not None and flight["mode"] == "LOITER"
 
 
 def test_the_craft_stays_armed_and_in_the_mode(start: Starter) -> None:
