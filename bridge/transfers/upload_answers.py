@@ -19,7 +19,7 @@ from reports.verdict import Result, Verdict
 _MEMORY_S = 10.0
 _CANCEL_S = 3.0
 #: These never ask for the final ack again, so it is sent four times. Not later: QGroundControl's user takes 0.1 s to
-#: begin the next transfer, whose end a stale ack would be. MAVSDK's script begins it at once: only if items were lost.
+#: begin the next transfer, whose end a stale ack would be. A script on MAVSDK takes no time: only after a loss (True).
 NEVER_ASK = {False: (Kind.QGROUNDCONTROL,), True: (Kind.QGROUNDCONTROL, Kind.MAVSDK)}
 _ACK_AGAIN_S = (0.02, 0.04, 0.06)
 _ACK_LATE_S = 0.02

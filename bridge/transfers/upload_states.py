@@ -222,9 +222,9 @@ class Upload:
     number: int = 0
     #: The sender has ended it itself, with a MISSION_ACK: only Mission Planner's "Write Fast" does, and sends home.
     is_write_fast: bool = False
-    #: The list is the board's own without some items; an item was requested again.
+    #: The list is the board's own without some items.
     is_part: bool = False
-    has_losses: bool = False
+    has_losses: bool = False  # an item was requested again
 
     def __post_init__(self) -> None:
         self.state: UploadState = Waiting(self, Event(), self.heard_at)
